@@ -554,7 +554,7 @@ PASSED_BEFORE = [
     ("recover", recovered_from_five_percent_on, "`0.05` is far too large"),
     ("resample_systematic", in_another_order, "You sorted the weights"),
     ("should_resample", of_the_living, "weigh something"),
-    ("resample_roulette", without_putting_back, "No index came out twice"),
+    ("resample_roulette", without_putting_back, "no index came out twice"),
     ("resample_systematic", turned_too_far, "at most one gap"),
     ("hunt_1", by_the_mean_index, "on average"),
     ("hunt_4", of_weights_with_the_sum_1, "a common factor is no fault"),
@@ -629,8 +629,19 @@ def answer(ranges, expected, std):
     return np.sum(-0.5 * (e / std) ** 2 - np.log(std * np.sqrt(2 * np.pi)))
 """
 
+WITHIN_REACH = """
+def answer(grid, pose, ranges, bearings, std):
+    seen = ranges < 18.0
+    a = pose[2] + bearings[seen]
+    d = grid.distance[grid.cell_of(pose[:2] + ranges[seen, None] * np.column_stack([np.cos(a), np.sin(a)]))]
+    return np.sum(-0.5 * (d / std) ** 2 - np.log(std * np.sqrt(2 * np.pi)))
+"""
 
-@pytest.mark.parametrize("name, text", [("log_sum_exp", FAR_FROM_OTHERS), ("beam_weight", WITH_AN_ECHO)])
+
+@pytest.mark.parametrize(
+    "name, text",
+    [("log_sum_exp", FAR_FROM_OTHERS), ("beam_weight", WITH_AN_ECHO), ("distance_field_weight", WITHIN_REACH)],
+)
 def test_a_condition_that_leaves_out_what_counts_is_to_be_true(name, text):
     told = [judge(name, typed(text), seed).text for seed in range(2)]
     assert all("it does not belong there, but True in its place" in words for words in told)
@@ -669,3 +680,39 @@ def test_noise_scaled_by_the_root_of_the_time_step_is_told_by_how_it_grows():
         return odometry.step(x, u + std_u * np.sqrt(dt) * rng.standard_normal((len(x), 2)), dt)
 
     assert "power 1.5" in judge("sample_motion", scaled).text
+
+
+FOLDED = """
+def answer(pose, z, landmarks, std_range, std_bearing):
+    d = landmarks - pose[:2]
+    e = np.abs(z[:, 1] - np.arctan2(d[:, 1], d[:, 0]) + pose[2])
+    e = np.stack([z[:, 0] - np.hypot(*d.T), np.minimum(e, 2 * np.pi - e)]) / [[std_range], [std_bearing]]
+    return -0.5 * np.sum(e**2) - len(z) * np.log(2 * np.pi * std_range * std_bearing)
+"""
+
+
+def test_of_a_pose_the_heading_alone_is_to_be_wrapped():
+    assert "`pose[2]`: it belongs there wrapped" in judge("landmark_weight", typed(FOLDED)).text
+
+
+def test_random_numbers_that_change_nothing_are_no_missing_ones():
+    def told(turn):
+        def wheel(weights, rng):
+            spokes = np.arange(len(weights)) + turn(rng)
+            return np.searchsorted(np.cumsum(weights) / weights.mean(), spokes)
+
+        return ch09._drawn_from_the_rng(wheel, np.random.default_rng(0))
+
+    assert "changes nothing" in told(lambda rng: 0.5 + 1e-6 * rng.random())
+    assert "whatever `rng` is given" in told(lambda rng: 0.5) and told(lambda rng: rng.random()) is None
+
+
+def test_shares_that_belong_to_other_indices_are_told_as_these():
+    right = ch09.WEIGHTS[0]
+    assert "sorted" in ch09._shifted(np.sort(right)[::-1], right)
+    assert ch09._shifted(np.full(5, 0.2), right) == ""
+
+
+def test_slow_answers_find_the_distances_of_their_map_computed():
+    draws = (ch09.scan_at_a_pose, ch09.scan_on_another_map, ch09.scan_in_a_wide_hall)
+    assert all("distance" in vars(draw(np.random.default_rng(0))[0]) for draw in draws)

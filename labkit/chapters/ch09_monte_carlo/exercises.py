@@ -12,6 +12,7 @@ from ...documents.lecture.examples import load_building
 from ...exercises import metrics
 from ...exercises.budget import seconds
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...fast import maps as fast_maps
 from ...geometry import planar
 from ...localization import maps, mcl, odometry, particles
 from ...localization.sensors import scan_from_depth, weigh_landmarks
@@ -25,7 +26,15 @@ IMPORTS = 6.0  # seconds a call may take where students use scipy.stats: its imp
 @functools.cache
 def building():
     """The chapter's building, read once."""
-    return load_building()
+    found = load_building()
+    _measured(found.grid)
+    return found
+
+
+def _measured(grid):
+    """The grid with its distances computed, so that its copies, one a call, need not compute them anew."""
+    _ = grid.distance
+    return grid
 
 
 # Draws ---------------------------------------------------------------------------------------------------------------
@@ -126,18 +135,22 @@ def scan_on_another_map(rng):
     cells = np.full((60, 80), maps.FREE)
     cells[[0, -1]], cells[:, [0, -1]] = maps.OCCUPIED, maps.OCCUPIED
     cells[rng.integers(5, 55, 8), rng.integers(5, 75, 8)] = maps.OCCUPIED
-    grid = maps.OccupancyGrid(cells, 0.05, (-7.0, 4.0))
+    grid = _measured(maps.OccupancyGrid(cells, 0.05, (-7.0, 4.0)))
     pose = np.array([rng.uniform(-5.3, -4.7), rng.uniform(5.3, 5.7), rng.uniform(-3, 3)])
     return grid, pose, rng.uniform(0.3, 1.1, 12), np.linspace(-2.3, 2.3, 12), float(rng.uniform(0.15, 0.4))
 
 
 def scan_in_a_wide_hall(rng, count=12):
-    """grid, pose, ranges, bearings, std where every end point is meters away from the nearest wall."""
+    """grid, pose, ranges, bearings, std where every end point is meters away from the nearest wall, however long its beam
+    is: one is as long as the scanner of the building reaches, others are longer.
+    """
     cells = np.full((110, 120), maps.FREE)
     cells[[0, -1]], cells[:, [0, -1]] = maps.OCCUPIED, maps.OCCUPIED
-    pose = np.array([*rng.uniform(10, 12, 2), rng.uniform(-3, 3)])
+    pose = np.array([*rng.uniform(50, 60, 2), rng.uniform(-3, 3)])
     bearings = np.linspace(-2.3, 2.3, count) if count > 1 else rng.uniform(-2, 2, 1)
-    return maps.OccupancyGrid(cells, 0.2), pose, rng.uniform(0.5, 5.0, count), bearings, float(rng.uniform(0.5, 1.0))
+    ranges = np.linspace(44, 4, count) * rng.uniform(0.6, 1.0, count)
+    ranges[count // 2] = R_MAX
+    return _measured(maps.OccupancyGrid(cells, 1.0)), pose, ranges, bearings, float(rng.uniform(2.5, 5.0))
 
 
 def whole_scan(draw):
@@ -161,22 +174,31 @@ def plain_ray(rng, way=None):
     grid = building().grid
     while True:
         poses, bearings = particles.uniform_states(grid, 24, rng), rng.uniform(-2, 2, 24)
-        for pose, b, r in zip(poses, bearings, _casts(grid, poses, bearings)):
-            around, wrong = r[:5], r[5:]
-            squarely = np.ptp(around) < min(0.12 * around[2], 0.25) and around[2] > 1.0
-            apart = np.diff(np.sort(wrong)).min() > 0.2  # none of these slips is mistaken for another one
-            apart = apart and way in (None, (np.sign(math.cos(pose[2] + b)), np.sign(math.sin(pose[2] + b))))
-            if squarely and apart and np.abs(wrong - around[2]).min() > 0.3:
-                steps = _hits(grid, pose, b, R_MAX, grid.resolution / 2)
-                stepped = steps.min(initial=R_MAX)  # half a cell at a time: a wall's corner is easily stepped over
-                exact = maps.walk_ray(grid, pose, b, R_MAX)
-                clips = max(abs(exact - around[2]), abs(stepped - around[2])) > grid.resolution
-                behind = steps.max(initial=0.0) > around[2] + 1.0
-                if behind and not clips:
-                    return grid, pose, float(b), R_MAX
+        for k in np.flatnonzero(_squarely_and_apart(_casts(fast_maps.cast_rays, grid, poses, bearings))):
+            pose, b = poses[k], bearings[k]
+            casts = _casts(maps.cast_rays, grid, poses[k : k + 1], bearings[k : k + 1])
+            on_its_way = way in (None, (np.sign(math.cos(pose[2] + b)), np.sign(math.sin(pose[2] + b))))
+            if not on_its_way or not _squarely_and_apart(casts)[0]:  # the fast ones may pass a corner
+                continue
+            right = casts[0, 2]
+            steps = _hits(grid, pose, b, R_MAX, grid.resolution / 2)
+            stepped = steps.min(initial=R_MAX)  # half a cell at a time: a wall's corner is easily stepped over
+            if steps.max(initial=0.0) > right + 1.0 and abs(stepped - right) <= grid.resolution:
+                return grid, pose, float(b), R_MAX
 
 
-def _casts(grid, poses, bearings):
+def _squarely_and_apart(casts):
+    """Of rays with `_casts` as they are: whether each meets a wall squarely, and no slip is mistaken for another one or
+    for what is right, shape (n,).
+    """
+    around, wrong = casts[:, :5], casts[:, 5:]
+    right = around[:, 2]
+    squarely = (np.ptp(around, axis=1) < np.minimum(0.12 * right, 0.25)) & (right > 1.0)
+    apart = np.diff(np.sort(wrong, axis=1), axis=1).min(axis=1) > 0.2
+    return squarely & apart & (np.abs(wrong - right[:, None]).min(axis=1) > 0.3)
+
+
+def _casts(cast, grid, poses, bearings):
     """Ranges (n, 9) of n rays: five nearly alike, the right one in their middle, and four of slips with the angle."""
     theta, ray = poses[:, 2], poses[:, 2] + bearings
     angles = np.stack(
@@ -184,7 +206,7 @@ def _casts(grid, poses, bearings):
          bearings, theta, theta - bearings, math.pi / 2 - ray], axis=1
     )  # fmt: skip
     xy = np.broadcast_to(poses[:, None, :2], (*angles.shape, 2))
-    return grid.cast(np.dstack([xy, angles]), np.zeros(1), R_MAX)[..., 0]
+    return cast(grid, np.dstack([xy, angles]), np.zeros(1), R_MAX)[..., 0]
 
 
 EVERY_WAY = tuple(functools.partial(plain_ray, way=way) for way in ((1, 1), (-1, 1), (-1, -1), (1, -1)))
@@ -694,6 +716,17 @@ def _evenly_from_edge_to_edge(depth, field_of_view, near, far):
     return (depth / np.cos(b))[seen], b[seen]
 
 
+def _at_the_limit(own):
+    """What is not seen is kept, as a depth of `far`; own: as a range of `far`."""
+
+    def variant(depth, field_of_view, near, far):
+        seen = (depth >= near) & (depth <= far)
+        ranges, bearings = scan_from_depth(np.where(seen, depth, far), field_of_view, near, far)
+        return np.where(seen, ranges, far) if own else ranges, bearings
+
+    return variant
+
+
 def _within(near, far, ranges, bearings):
     """Of a scan the rays whose length lies between near and far."""
     kept = (ranges >= near) & (ranges <= far)
@@ -979,6 +1012,10 @@ RESAMPLING_SLIPS = (
         "You compare the variance of the weights, which grows with their size, with a share: compare effective_size(weights).",
     ),
     (
+        lambda w, t: 1 / (1 + np.var(w)) < t,
+        "1 / (1 + var(w)) is the effective share of weights of mean 1: divide them by their mean first, or call effective_size(weights).",
+    ),
+    (
         lambda w, t: w.max() / w.sum() > t,
         "You compare the share of the heaviest particle. Many of middling weight can be worth few as well: effective_size(weights).",
     ),
@@ -1019,10 +1056,16 @@ def _searched_in_shares(weights, rng):
     return np.clip(np.searchsorted(weights / weights.sum(), rng.random(len(weights))), 0, len(weights) - 1)
 
 
-def _spokes_to_the_end(weights, rng):
-    """Spokes from 0 to W, both included, before the turn."""
+def _spokes_to_the_end(weights, rng, more=0):
+    """Spokes from 0 to W, both included, before the turn, which is that of so many spokes `more` or less."""
     ends, m = np.cumsum(weights), len(weights)
-    return np.minimum(np.searchsorted(ends, (rng.random() / m + np.linspace(0, 1, m)) * ends[-1]), m - 1)
+    return np.minimum(np.searchsorted(ends, (rng.random() / (m + more) + np.linspace(0, 1, m)) * ends[-1]), m - 1)
+
+
+def _turned_by_less(weights, rng):
+    """The turn is one of a wheel whose weights add up to 1."""
+    ends, m = np.cumsum(weights), len(weights)
+    return np.minimum(np.searchsorted(ends, (rng.random() + np.arange(m) * ends[-1]) / m), m - 1)
 
 
 def _one_step_a_spoke(weights, rng):
@@ -1136,6 +1179,12 @@ def _listens(draw):
         first = [np.asarray(draw(function, np.random.default_rng(seed))) for seed in seeds]
         again = [np.asarray(draw(function, np.random.default_rng(seed))) for seed in seeds]
         if all(np.array_equal(first[0], other) for other in first + again):
+            drawn_from = np.random.default_rng(seeds[0])
+            draw(function, drawn_from)
+            if drawn_from.bit_generator.state != np.random.default_rng(seeds[0]).bit_generator.state:
+                return (
+                    "what you draw from `rng` changes nothing: 8 seeds give the same. Is it far too small, or not used?"
+                )
             return "whatever `rng` is given, the same comes out: draw the random numbers from it."
         if not all(map(np.array_equal, first, again)):
             return "two runs with the same seed differ: draw from the `rng` you are given, not from another one."
@@ -1177,8 +1226,7 @@ def _proportional(resample, rng):
                 f"with the weights {weights.tolist()} index {k} gets {100 * found[k]:.0f} % of the draws "
                 f"instead of {100 * expected[k]:.0f} %."
             )
-            words = _shifted(found, expected) or _shares_of_another_rule(resample, rng)
-            return told + (words or _never_twice(resample, weights, rng))
+            return told + (_shifted(found, expected) or _shares_of_another_rule(resample, rng))
     return None
 
 
@@ -1209,15 +1257,20 @@ def _shifted(found, expected):
         apart = np.ptp(shares) > 2 * SHARE_OFF if shares.size else False
         if apart and np.abs(found[1:-1] - shares).max() < SHARE_OFF:
             return f" Between the first and the last, each index gets the share of the one {neighbor} it: is it one too {slip}?"
+    if np.abs(np.sort(found) - np.sort(expected)).max() < SHARE_OFF:
+        return " The shares are the right ones, but each is another index's: has something been sorted?"
     return ""
 
 
-def _never_twice(resample, weights, rng):
-    """That no index came out twice in many draws by these weights, as one more sentence."""
-    drawn = (np.asarray(resample(weights.copy(), rng)) for _ in range(50))
-    if any(len(set(index.tolist())) < len(index) for index in drawn):
-        return ""
-    return " No index came out twice in 50 calls: a heavy one must be drawn as often as its weight asks for."
+def _comes_twice(resample, rng):
+    """A heavy index against draws of which each comes out once, as without replacement."""
+    weights = np.array([0.1, 0.7, 0.1, 0.1])
+    if any(len(set(np.asarray(resample(weights.copy(), rng)).tolist())) < len(weights) for _ in range(50)):
+        return None
+    return (
+        f"with the weights {weights.tolist()} no index came out twice in 50 calls: a heavy one must be drawn as often as its "
+        "weight asks for."
+    )
 
 
 SCALES = (1e-9, 1e6)
@@ -2328,7 +2381,8 @@ CHAPTER = Chapter(
                 (
                     scan_in_a_wide_hall,
                     metrics.Numbers(1e-6),
-                    "Right near walls, but not in a wide hall, where the nearest one is meters away (are distances cut off?):",
+                    "Right near walls, but not in a wide hall with beams of up to 44 m, which end meters away from the nearest one "
+                    "(are distances cut off, or beams left out?):",
                 ),
                 (
                     functools.partial(scan_in_a_wide_hall, count=1),
@@ -2407,6 +2461,7 @@ CHAPTER = Chapter(
             properties=(
                 _valid,
                 _drawn_from_the_rng,
+                _comes_twice,
                 _proportional,
                 _spins_are_independent,
                 _of_any_sum,
@@ -2455,9 +2510,16 @@ CHAPTER = Chapter(
                         (_searched_in_shares, "roulette-searched-in-shares"),
                     )
                 ),
+                *(
+                    Mistake(
+                        lambda w, rng, step=step: _spin(np.sort(w)[::step], rng),
+                        "You sorted the weights: then an index no longer belongs to its particle.",
+                    )
+                    for step in (1, -1)
+                ),
                 Mistake(
-                    lambda w, rng: np.searchsorted(np.cumsum(np.sort(w)), rng.random(len(w)) * w.sum()),
-                    "You sorted the weights: then an index no longer belongs to its particle.",
+                    lambda w, rng: rng.choice(len(w), len(w), replace=False, p=w / w.sum()),
+                    "replace=False draws each index once at most. A heavy particle must be drawn several times: leave it out.",
                 ),
             ],
             draws=8,
@@ -2471,6 +2533,7 @@ CHAPTER = Chapter(
                 _valid,
                 _drawn_from_the_rng,
                 _turn_is_one_gap,
+                _comes_twice,
                 _proportional,
                 _equal_weights_stay,
                 _spokes_are_even,
@@ -2512,10 +2575,17 @@ CHAPTER = Chapter(
                     ),
                     "You turn the wheel by up to W. One gap is enough, up to W / M: (rng.random() + np.arange(M)) / M.",
                 ),
+                *(
+                    Mistake(
+                        functools.partial(_spokes_to_the_end, more=more),
+                        "Your first and your last spoke stand one whole turn apart, as np.linspace does with its end point: M spokes are W / M apart.",
+                        id=id,
+                    )
+                    for more, id in ((0, "systematic-end-point"), (-1, "systematic-end-point-2"))
+                ),
                 Mistake(
-                    _spokes_to_the_end,
-                    "Your first and your last spoke stand one whole turn apart, as np.linspace does with its end point: M spokes are W / M apart.",
-                    id="systematic-end-point",
+                    _turned_by_less,
+                    "The turn is one from 0 to W / M, and yours goes to 1 / M: the weights may have any sum W, so the turn grows with it.",
                 ),
                 Mistake(
                     _one_step_a_spoke,
@@ -2725,6 +2795,10 @@ CHAPTER = Chapter(
                 Mistake(_cycle(weights=lambda w, p, k, n: w * p ** (1 / n)), "Each likelihood counts fully: no root."),
                 Mistake(_cycle(share=lambda w: w), "The weights do not add up to 1: divide by their sum."),
                 Mistake(
+                    lambda w, p, k, n: (w / w.sum() * p / p.sum(), k % n == 0),
+                    "Weights and likelihoods add up to 1 each, but their products do not: divide the product by its own sum.",
+                ),
+                Mistake(
                     lambda w, p, k, n: (w * p / (w * p).sum() if k % n == 0 else w * p, k % n == 0),
                     "The weights do not add up to 1 in the steps between: divide by their sum in each step.",
                 ),
@@ -2857,6 +2931,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda a, w: math.acos((w * np.cos(a)).sum() / w.sum()),
                     "The arccosine knows only half the circle, and wants a unit vector. np.arctan2 takes both parts.",
+                ),
+                Mistake(
+                    lambda a, w: math.copysign(1, (w * np.sin(a)).sum()) * math.acos((w * np.cos(a)).sum() / w.sum()),
+                    "The arccosine wants the cosine part of a unit vector, and the mean of unit vectors is shorter than 1. np.arctan2 takes both parts, whatever their length.",
                 ),
                 Mistake(
                     lambda a, w: math.atan((w * np.tan(a)).sum() / w.sum()),
@@ -3096,6 +3174,13 @@ CHAPTER = Chapter(
                 Mistake(
                     _depth(seen=lambda d, near, far: np.ones(len(d), bool)),
                     "Columns without a depth between near and far are to be left out.",
+                ),
+                *(
+                    Mistake(
+                        _at_the_limit(own),
+                        "Columns that are not seen come back as readings at `far`. They are to be left out, of ranges and bearings both.",
+                    )
+                    for own in (False, True)
                 ),
                 Mistake(lambda *a: scan_from_depth(*a)[::-1], "The order is ranges, bearings."),
                 Mistake(

@@ -163,6 +163,12 @@ def _without_comma(printed):
     return half_unit(printed.partition(",")[0])
 
 
+def _comma_alone_unread(printed):
+    """Decimals behind a comma are not seen, an exponent is."""
+    number, mark, exponent = printed.partition("e")
+    return half_unit(number.partition(",")[0] + mark + exponent)
+
+
 def _other_sign(printed):
     return _without_exponent(printed) ** 2 / half_unit(printed)
 
@@ -195,12 +201,12 @@ def _without_zeros(number):
     return number.rstrip("0") if "." in number else number
 
 
-def _significant_digits(counted):
-    """The last of the digits counted, where the first digit that is not 0 stands in the place of the ones."""
+def _significant_digits(counted, before=1):
+    """The last of the digits counted, where so many of them stand before the point."""
 
     def variant(printed):
         number, _, exponent = printed.replace(",", ".").partition("e")
-        return 0.5 * 10.0 ** (int(exponent or 0) - len(counted(number.replace(".", "").lstrip("-"))) + 1)
+        return 0.5 * 10.0 ** (int(exponent or 0) - len(counted(number.replace(".", "").lstrip("-"))) + before)
 
     return variant
 
@@ -240,6 +246,18 @@ def _ends_at_the_exponent(printed):
 def _exponent_twice(printed):
     """The decimals as the letters behind the point, the exponent's among them, which shifts it as well."""
     return _ends_at_the_exponent(printed) * 10.0 ** int(printed.partition("e")[2] or 0)
+
+
+def _letters_behind_the_point(printed):
+    """The same, where an exponent is read only if there is no point."""
+    has_a_point = "." in printed.replace(",", ".")
+    return _ends_at_the_exponent(printed) if has_a_point else half_unit(printed)
+
+
+def _exponents_below_0(printed):
+    """Every exponent read as a negative one."""
+    number, _, exponent = printed.partition("e")
+    return half_unit(number) * 10.0 ** -abs(int(exponent or 0))
 
 
 def _hundreds(printed):
@@ -426,9 +444,14 @@ STATUSES = (
         _judged(_real_word, lambda h, o, b, m: "not computable" if o <= h + b else "consistent"),
         "A simulation within half unit and bound stands beside the printed number: consistent. Yours is turned round.",
     ),
-    (
-        _judged(_real_word, lambda h, o, b, m: "consistent" if o <= h + b else "misprint" if m else "contradiction"),
-        "A simulation far from the printed value proves no misprint: the row is not computable.",
+    *(
+        (
+            _judged(
+                _real_word, lambda h, o, b, m, word=word: "consistent" if o <= h + b else "misprint" if m else word
+            ),
+            "A simulation far from the printed value proves no misprint: the row is not computable.",
+        )
+        for word in ("contradiction", "not computable")
     ),
     (
         _judged(_real_word, lambda h, o, b, m: "consistent" if o <= h else "not computable"),
@@ -599,7 +622,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _counts_all_digits, "You counted all digits. Only those after the decimal point make it finer."
                 ),
-                Mistake(_without_comma, "The comma of 1,5 is a decimal point: this number has one decimal, not none."),
+                *(
+                    Mistake(variant, "The comma of 1,5 is a decimal point: this number has one decimal, not none.")
+                    for variant in (_without_comma, _comma_alone_unread)
+                ),
                 Mistake(
                     _other_sign, "3e-4 is 3 times 10 to the power -4: your exponent shifts the half unit the wrong way."
                 ),
@@ -621,10 +647,11 @@ CHAPTER = Chapter(
                 ),
                 *(
                     Mistake(
-                        _significant_digits(counted),
+                        _significant_digits(counted, before),
                         "You counted digits, all of them or the significant ones. What the last digit is worth depends on its place alone, before the point or behind it: 86 and 1086 hide the same.",
                     )
                     for counted in (lambda digits: digits.lstrip("0"), lambda digits: digits)
+                    for before in (1, 0)
                 ),
                 Mistake(
                     _four_digits,
@@ -638,9 +665,12 @@ CHAPTER = Chapter(
                     _ends_at_the_exponent,
                     "An exponent is not read yet: in 3.20e3 two decimals stand before it, and it shifts the half unit by three places.",
                 ),
-                Mistake(
-                    _exponent_twice,
-                    "The letters of the exponent are counted as decimals: 1.5e-3 has one, the 5. Take the exponent off first.",
+                *(
+                    Mistake(
+                        variant,
+                        "The letters of the exponent are counted as decimals: 1.5e-3 has one, the 5. Take the exponent off first.",
+                    )
+                    for variant in (_exponent_twice, _letters_behind_the_point)
                 ),
                 *(
                     Mistake(
@@ -654,9 +684,12 @@ CHAPTER = Chapter(
                     _until_whole,
                     "A number does not know how it was printed: zeros at its end are lost. Count the decimals in the string.",
                 ),
-                Mistake(
-                    _negative_exponents_alone,
-                    "An exponent may be positive as well: 3.20e3 has two decimals, and its last digit is worth 10.",
+                *(
+                    Mistake(
+                        variant,
+                        "An exponent may be positive as well: 3.20e3 has two decimals, and its last digit is worth 10.",
+                    )
+                    for variant in (_negative_exponents_alone, _exponents_below_0)
                 ),
                 Mistake(_with_the_sign, "Half a unit is a size, without a sign: that of -0,250 is 0.0005."),
                 Mistake(

@@ -756,6 +756,19 @@ def _only(kind):
     return lambda text: [other for other, how in single_slips(text).items() if how == kind]
 
 
+def _by_its_own_rounding(entries, average):
+    """What each number had to be is computed from the others, and is to be within the half unit of its slip alone."""
+    if _agree(entries, average):
+        return set()
+    x, n = [number(text) for text in entries], len(entries)
+    wanted = [n * number(average) - (sum(x) - value) for value in x] + [sum(x) / n]
+    return {
+        k
+        for k, (text, value) in enumerate(zip([*entries, average], wanted))
+        if any(abs(number(other) - value) <= half_unit(other) * (1 + 1e-9) for other in single_slips(text))
+    }
+
+
 def _against_the_sum(entries, average):
     slack = sum(map(half_unit, entries)) + half_unit(average)
     return abs(sum(map(number, entries)) - number(average)) <= slack * (1 + 1e-9)
@@ -933,6 +946,11 @@ SUSPECTS = Exercise(
         Mistake(
             _search(agree=_against_the_sum),
             "You compare the sum with the average: divide by how many entries there are.",
+        ),
+        Mistake(
+            _by_its_own_rounding,
+            "What a number had to be, computed from the others, is as inexact as they are: they were rounded too. "
+            "Allow what all half units together leave open, not its own alone.",
         ),
         Mistake(
             _search(first=True),
