@@ -180,7 +180,7 @@ def impossible_ones(resample, rng):
 
 def by_the_heavy_one(resample, rng):
     weights = np.r_[0.55, np.full(9, 0.05)]
-    return bool(abs(np.mean([np.mean(resample(weights, rng) == 0) for _ in range(2000)]) - 0.55) < 0.02)
+    return bool(abs(np.mean([np.mean(resample(weights, rng) == 0) for _ in range(800)]) - 0.55) < 0.03)
 
 
 def any_exception(resample, rng):
@@ -213,8 +213,8 @@ def heaviest_most_often(resample, rng):
 
 def of_four_particles(resample, rng):
     weights = np.array([0.5, 0.2, 0.2, 0.1])
-    index = np.concatenate([resample(weights, rng) for _ in range(2000)])
-    return bool(np.abs(np.bincount(index, minlength=4) / index.size - weights).max() < 0.03)
+    index = np.concatenate([resample(weights, rng) for _ in range(800)])
+    return bool(np.abs(np.bincount(index, minlength=4) / index.size - weights).max() < 0.05)
 
 
 def an_exception_alone(resample, rng):
@@ -274,7 +274,9 @@ def test_a_wheel_with_a_last_end_of_one_is_right(seed):
     assert judge("resample_systematic", answer, seed).status == CORRECT
 
 
-def test_cells_that_nobody_has_seen_do_not_stop_a_ray():
+def test_cells_that_nobody_has_seen_do_not_stop_a_ray(monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.0)  # what is told is not asked here
+
     def answer(grid, pose, bearing, r_max):
         r, angle = np.arange(0, r_max, grid.resolution / 2), pose[2] + bearing
         hit = r[grid.at(pose[:2] + r[:, None] * [np.cos(angle), np.sin(angle)]) != maps.FREE]
@@ -400,8 +402,8 @@ def turned_too_far(weights, rng):
 
 
 def by_the_mean_index(resample, rng):
-    index = np.concatenate([resample(np.array([1.0, 2.0, 3.0, 4.0]), rng) for _ in range(3000)])
-    return abs(index.mean() - 2.0) < 0.05
+    index = np.concatenate([resample(np.array([1.0, 2.0, 3.0, 4.0]), rng) for _ in range(1000)])
+    return abs(index.mean() - 2.0) < 0.08
 
 
 def of_weights_with_the_sum_1(weigh):
@@ -562,7 +564,9 @@ PASSED_BEFORE = [
 
 
 @pytest.mark.parametrize("name, answer, words", PASSED_BEFORE)
-def test_what_was_right_on_typical_data_only_is_refused(name, answer, words):
+def test_what_was_right_on_typical_data_only_is_refused(name, answer, words, monkeypatch):
+    if not words:  # what is told is not asked
+        monkeypatch.setattr(engine, "LOOKING", 0.0)
     outcome = judge(name, answer)
     assert outcome.status == NOT_YET and words in outcome.text
 
@@ -606,7 +610,9 @@ def test_the_step_that_goes_wrong_is_found_in_slow_answers_and_in_results_taken_
     assert words in judge(name, typed(text)).text
 
 
-def test_a_walk_that_ends_after_ten_meters_meets_a_longer_hall():
+def test_a_walk_that_ends_after_ten_meters_meets_a_longer_hall(monkeypatch):
+    monkeypatch.setattr(engine, "LOOKING", 0.0)  # what is told is not asked here
+
     def ten_meters(grid, pose, bearing, r_max):
         a = pose[2] + bearing
         steps = (k * min(0.05, grid.resolution / 2) for k in range(int(10 / min(0.05, grid.resolution / 2))))
