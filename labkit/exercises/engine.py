@@ -25,6 +25,7 @@ from .again import Again
 from .budget import Budget, seconds
 from .defaults import Defaults
 from .typeset import typeset
+from .whole import WholeNumbers
 
 TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code raised"
 NOISY = "exact on clean data, but noise enters otherwise than it should: on noisy data"
@@ -129,6 +130,7 @@ class Exercise(Item):
     properties: functions (student_function, rng) -> None or a sentence that says what does not hold.
     fixed:      {argument: reason} of arguments that are the same, or of one shape, in all draws: what the docstring
                 leaves free must vary, or an answer could be wired to it.
+    decimals:   {argument: reason} of arguments that nobody has to take in whole numbers.
     draws:      how many draws a check takes; 0 where the properties alone judge.
     limit:      seconds that one call may take.
     """
@@ -141,6 +143,7 @@ class Exercise(Item):
     noisy: tuple = ()
     properties: tuple = ()
     fixed: dict = field(default_factory=dict)
+    decimals: dict = field(default_factory=dict)
     draws: int = 5
     limit: float = guard.TIME_LIMIT
 
@@ -170,6 +173,11 @@ class Exercise(Item):
         special = [(draw, metric) for draw, metric, *_ in self.noisy]
         first = [*itertools.islice(itertools.cycle(plain), MORE_CASES), *special, *special]
         return Again(itertools.chain(first, itertools.cycle(plain)), self.reference)
+
+    @functools.cached_property
+    def whole(self):
+        """The property that whole numbers are numbers, too."""
+        return WholeNumbers(self)
 
     @property
     def arguments(self):
@@ -207,7 +215,7 @@ class Exercise(Item):
         if verdict.status == CORRECT:
             if words := trial.repeated() or trial.remembered(rng):
                 return trial.outcome(NOT_YET, _closed(words))
-            for holds in self.properties:
+            for holds in (*self.properties, self.whole):
                 problem = trial.property(holds, rng)
                 if problem:
                     return problem

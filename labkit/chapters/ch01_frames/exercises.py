@@ -10,7 +10,6 @@ from ...documents.lab_sheet.printed import points
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
 from ...exercises.special import right_where
-from ...exercises.whole import right_for_whole_numbers
 from ...geometry import frames
 from . import special
 
@@ -539,12 +538,7 @@ CHAPTER = Chapter(
                 (lambda rng: (edges_on_axes(rng)[0],), metrics.Numbers(1e-9), ON_AXES),
                 (nearly_of_length_1, metrics.Numbers(1e-9), "right, but not of a vector whose length is nearly 1:"),
             ],
-            properties=(
-                right_for_whole_numbers(
-                    frames.unit_vector, metrics.Numbers(1e-9), functools.partial(scaled_direction, scale=1.0), 0
-                ),
-                right_where(frames.unit_vector, metrics.Numbers(1e-9), *special.VECTORS),
-            ),
+            properties=(right_where(frames.unit_vector, metrics.Numbers(1e-9), *special.VECTORS),),
             hints=(
                 "A direction says which way, not how far. What has to become 1, and by which number do you divide to get it there?",
                 "The length of v is the root of the sum of its squared components.",
@@ -624,7 +618,6 @@ CHAPTER = Chapter(
                 (nearly_at_right_angles, metrics.Rotations(1e-7), f"right, but not of short edges {NEARLY_SQUARE}"),
             ],
             properties=(
-                right_for_whole_numbers(frames.gram_schmidt, metrics.Rotations(1e-7), two_directions, 0, 1),
                 right_where(frames.gram_schmidt, metrics.Rotations(1e-7), *special.EDGES, *special.SHORT_EDGES),
             ),
             hints=(
@@ -720,10 +713,7 @@ CHAPTER = Chapter(
                 (points_on_axes, metrics.Poses(1e-6, 1e-6), ON_AXES),
                 (nearly_square_points, metrics.Poses(1e-6, 1e-6), f"right, but not of edges {NEARLY_SQUARE}"),
             ],
-            properties=(
-                right_for_whole_numbers(frames.frame_from_points, metrics.Poses(1e-6, 1e-6), three_points, 0, 1, 2),
-                right_where(frames.frame_from_points, metrics.Poses(1e-6, 1e-6), *special.TRIANGLES),
-            ),
+            properties=(right_where(frames.frame_from_points, metrics.Poses(1e-6, 1e-6), *special.TRIANGLES),),
             hints=(
                 "A pose is a rotation (which way the axes point) and a translation (where the origin is).",
                 "The two directions are x_point - origin and y_point - origin; gram_schmidt makes axes of them. Start with np.eye(4), and fill in its block and its last column.",
@@ -796,12 +786,7 @@ CHAPTER = Chapter(
                 (shift_alone, metrics.Poses(1e-6, 1e-6), "right, but not of a pose that shifts without a turn:"),
                 (small_motion, metrics.Poses(1e-6, 1e-6), "right, but not of a small turn and a small shift:"),
             ],
-            properties=(
-                right_for_whole_numbers(
-                    frames.invert, metrics.Poses(1e-6, 1e-6), lambda rng: (special.of_whole_numbers(rng),), 0
-                ),
-                right_where(frames.invert, metrics.Poses(1e-6, 1e-6), *special.POSES),
-            ),
+            properties=(right_where(frames.invert, metrics.Poses(1e-6, 1e-6), *special.POSES),),
             hints=(
                 "Solve p_W = R p_F + t for p_F.",
                 "p_F = Rᵀ (p_W - t) = Rᵀ p_W - Rᵀ t: the rotation is Rᵀ, the translation is -Rᵀ t.",
@@ -1139,15 +1124,7 @@ CHAPTER = Chapter(
                     "right, but not of angles beyond 180 deg:",
                 ),
             ],
-            properties=(
-                right_for_whole_numbers(
-                    frames.matrix_from_kuka,
-                    metrics.Poses(1e-6, 1e-6),
-                    functools.partial(special.angles, abc=(1.0, -1.0, 2.0)),
-                    0,
-                ),
-                right_where(frames.matrix_from_kuka, metrics.Poses(1e-6, 1e-6), *special.ANGLES),
-            ),
+            properties=(right_where(frames.matrix_from_kuka, metrics.Poses(1e-6, 1e-6), *special.ANGLES),),
             hints=(
                 "Three elementary turns, multiplied in the order the controller names them, and a translation.",
                 "R = Rz(A) Ry(B) Rx(C). Write each turn as a 3x3 array, with the cosines and sines of A, B, C (radians, in this order), multiply "
@@ -1373,10 +1350,7 @@ CHAPTER = Chapter(
             reference=frames.fit_frame,
             draw=(drawn_points, functools.partial(drawn_points, flat=True)),
             metric=metrics.Poses(1e-6, 1e-6),
-            properties=(
-                right_for_whole_numbers(frames.fit_frame, metrics.Poses(1e-6, 1e-6), drawn_points, 0, 1),
-                right_where(frames.fit_frame, metrics.Poses(1e-6, 1e-6), *special.SETS),
-            ),
+            properties=(right_where(frames.fit_frame, metrics.Poses(1e-6, 1e-6), *special.SETS),),
             noisy=(
                 functools.partial(drawn_points, count=3),
                 metrics.Poses(1e-6, 1e-6),

@@ -935,6 +935,7 @@ CHAPTER = Chapter(
             reference=chaining.orthonormalize,
             draw=(worn_pose, stretched_pose),
             fixed={"T": ONE_POSE},
+            decimals={"T": "a copy of it is asked for, and that of whole numbers holds whole numbers"},
             metric=metrics.Poses(1e-6, 1e-6),
             noisy=[
                 (

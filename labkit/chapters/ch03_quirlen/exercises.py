@@ -9,7 +9,6 @@ from ...documents.lab_sheet import printed as lab_sheet
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
 from ...exercises.special import right_where
-from ...exercises.whole import right_for_whole_numbers
 from ...geometry import frames
 from ...geometry.lie import exp_so3
 from . import special
@@ -607,15 +606,7 @@ CHAPTER = Chapter(
                 (functools.partial(few_poses_and_points, count=n), metrics.Numbers(1e-9, "mm"), words)
                 for n, words in FEW
             ],
-            properties=(
-                *(
-                    right_for_whole_numbers(
-                        pivot.pivot_residuals, metrics.Numbers(1e-9, "mm"), special.of_whole_numbers, *which
-                    )
-                    for which in ((0,), (1, 2))
-                ),
-                right_where(pivot.pivot_residuals, metrics.Numbers(1e-9, "mm"), *special.WITH_POINTS),
-            ),
+            properties=(right_where(pivot.pivot_residuals, metrics.Numbers(1e-9, "mm"), *special.WITH_POINTS),),
             hints=(
                 "Where is the tip in each pose, and where should it be?",
                 "Equation (2) of the sheet: R_i tip + p_i - point, one row per pose.",
@@ -967,12 +958,7 @@ CHAPTER = Chapter(
             reference=_tukey_weights,
             draw=tuple(functools.partial(draw, count=n) for n in (11, 6) for draw in (near_first, far_first)),
             metric=metrics.Numbers(1e-9),
-            properties=(
-                right_for_whole_numbers(
-                    _tukey_weights, metrics.Numbers(1e-9), functools.partial(near_first, count=9), 0
-                ),
-                right_where(_tukey_weights, metrics.Numbers(1e-9), *special.DISTANCES),
-            ),
+            properties=(right_where(_tukey_weights, metrics.Numbers(1e-9), *special.DISTANCES),),
             noisy=[
                 (one_at_0, metrics.Numbers(1e-9), "right, but not where a distance is 0:"),
                 (all_far, metrics.Numbers(1e-9), "right, but not where all poses are too far away:"),

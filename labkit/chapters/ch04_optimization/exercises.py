@@ -10,7 +10,6 @@ from ...estimation import convexity
 from ...estimation import optimization as opt
 from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
-from ...exercises.whole import right_for_whole_numbers
 from . import beyond
 
 
@@ -657,7 +656,6 @@ CHAPTER = Chapter(
             fixed={"x": TWO},
             metric=metrics.Numbers(1e-6),  # central differences are right as well
             noisy=special_places(4e-7) + 3 * [BESIDE_THE_CENTER],
-            properties=(right_for_whole_numbers(wells.gradient, metrics.Numbers(1e-6), place, 0),),
             hints=(
                 "Each well is −w/q with q = |x − c|² + 1. Differentiate it by the chain rule, q first.",
                 "The derivative of −w/q is (w/q²) times the gradient of q, and the gradient of q is 2(x − c).",
@@ -773,9 +771,7 @@ CHAPTER = Chapter(
             draw=beyond.function_and_step,
             metric=metrics.Numbers(1e-9),
             noisy=[(draw, metrics.Numbers(tol, least=least), words) for draw, tol, least, words in beyond.MEASURED],
-            properties=(
-                right_for_whole_numbers(beyond.measured_gradient, metrics.Numbers(1e-9), beyond.function_and_step, 1),
-            ),
+            properties=(),
             hints=(
                 "Move one unknown at a time, a step to each side, and leave the others where they are.",
                 "Component k is (f(x + h e) − f(x − h e)) / (2h), where e is the unit vector of unknown k: a row of `np.eye(len(x))`.",
@@ -865,7 +861,6 @@ CHAPTER = Chapter(
             fixed={"x": TWO},
             metric=metrics.Numbers(1e-6),
             noisy=special_places(1e-6),
-            properties=(right_for_whole_numbers(wells.hessian, metrics.Numbers(1e-4), place, 0),),
             hints=(
                 "Differentiate the gradient (2w/q²)(x − c) once more: the product rule gives two terms for each well.",
                 "One term is (2w/q²) I. The other one is (x − c) times the gradient of 2w/q², an outer product: −(8w/q³) (x − c)(x − c)ᵀ. "
@@ -1145,7 +1140,6 @@ CHAPTER = Chapter(
                     "right, but not where f bends ten thousand times more one way than the other:",
                 ),
             ],
-            properties=(right_for_whole_numbers(opt.newton_step, metrics.Numbers(1e-6), MODELS[0], 0),),
             hints=(
                 "The quadratic model is stationary where its gradient g + H h vanishes.",
                 "Solve H h = −g for h. No inverse is needed, and no H⁻¹ as in equation (2-26) either.",
@@ -1292,7 +1286,6 @@ CHAPTER = Chapter(
             ),
             metric=metrics.Numbers(1e-9),
             noisy=[(draw, metrics.Numbers(tol, least=least), words) for draw, tol, least, words in beyond.CHORDS],
-            properties=(right_for_whole_numbers(convexity.rise_above_chord, metrics.Numbers(1e-6), beyond.bowl, 1, 2),),
             hints=(
                 "Walk from x to y, and at each place compare f with the straight line between its two ends.",
                 "At share t the place is (1 − t) x + t y, and the chord stands at (1 − t) f(x) + t f(y). Of the differences f − chord take the largest.",
@@ -1399,7 +1392,6 @@ CHAPTER = Chapter(
             fixed={"x": TWO},
             metric=metrics.Numbers(1e-6),
             noisy=special_places(1e-6),
-            properties=(right_for_whole_numbers(wells.jacobian, metrics.Numbers(1e-4), place, 0),),
             hints=(
                 "Each residual vector is √(w/q) times x − c, a product: two terms for each well, a 2x2 block.",
                 "√(w/q) times the derivative of x − c, which is I, plus (x − c) times the gradient of √(w/q), an outer product: "
@@ -1736,7 +1728,6 @@ CHAPTER = Chapter(
                 for step, words in BESIDE_THE_RIM
             ]
             + [(draw, metrics.Numbers(1e-8, least=0.0), words) for draw, words in SPECIAL_DOGLEGS],
-            properties=(right_for_whole_numbers(opt.dogleg_step, metrics.Numbers(1e-6), DOGLEG_CASES[1], 0),),
             draws=12,
             fixed={"g": TWO, "B": TWO},
             hints=(
