@@ -133,7 +133,7 @@ def _rotation_kind(matrices, what):
     if sheared > 1e-3:
         return f"your {what} is not orthonormal: RᵀR differs from I by {sheared:.2g}"
     if any((np.linalg.det(r) < 0).any() for r in matrices):
-        return f"your {what} is a reflection, its determinant is -1: one axis points the wrong way"
+        return f"your {what} is a reflection, its determinant is -1: one axis points the wrong way, or all three do"
     return None
 
 

@@ -77,6 +77,7 @@ def test_unrelated_numbers_have_no_relation(expected):
         (lambda R: np.swapaxes(R, -1, -2), "transpose"),
         (lambda R: 1.1 * R, "not orthonormal"),
         (lambda R: R * (1, 1, -1), "reflection"),
+        (np.negative, "one axis points the wrong way, or all three do"),
     ],
 )
 def test_relations_of_rotations(change, told):

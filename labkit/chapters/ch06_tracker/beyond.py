@@ -44,15 +44,19 @@ def so_many_readings(rng, n):
 
 
 def readings_of_balanced_parts(rng):
-    """Such quaternions about one with parts a, -a, b and -b: which is the largest, and the sign of their sum, is noise."""
+    """Such quaternions about one with parts a, -a, b and -b, as many of either sign: which part is the largest, the sign
+    of their sum, and on which side of their plain mean they lie, is noise.
+    """
     while True:
         a, b = rng.uniform(0.3, 0.9), rng.uniform(0.1, 0.25)
         center = rng.permutation([a, -a, b, -b])
         R = matrix_from_quaternion(center / np.linalg.norm(center))
-        q = quaternion_from_matrix(R @ exp_so3(0.035 * rng.normal(size=(int(rng.integers(8, 16)), 3))))
+        q = quaternion_from_matrix(R @ exp_so3(0.035 * rng.normal(size=(2 * int(rng.integers(4, 8)), 3))))
         same = q * np.where(q @ q[0] < 0, -1.0, 1.0)[:, None]
-        if all(2 <= (noise < 0).sum() <= len(q) - 2 for noise in (same.sum(axis=1), _largest_part(same))):
-            return (same * rng.permutation(np.r_[1, 1, 1, -1, -1, rng.choice([-1, 1], len(q) - 5)])[:, None],)
+        q = same * rng.permutation(np.resize([1.0, -1.0], len(q)))[:, None]
+        rules = same.sum(axis=1), _largest_part(same), same @ q.mean(axis=0)
+        if all(2 <= (noise < 0).sum() <= len(q) - 2 for noise in rules):
+            return (q,)
 
 
 def _largest_part(q):
@@ -130,6 +134,12 @@ STOPS = [
                 _unit_mean(lambda q: np.where(q[:, 3] < 0, -1.0, 1.0)),
                 "You made w positive. Near a half turn w is about 0, and its sign is noise: readings of one rotation get opposite signs.",
                 id="mean_quaternion-w",
+            ),
+            Mistake(
+                _unit_mean(lambda q: np.where(q @ q.mean(axis=0) < 0, -1.0, 1.0)),
+                "You turn each reading to the side of their plain mean. Where about as many come with either sign they cancel, and that mean is "
+                "noise: compare all with one reading.",
+                id="mean_quaternion-plain-mean",
             ),
             Mistake(
                 _unit_mean(lambda q: np.where(q[:, 0] < 0, -1.0, 1.0)),
@@ -217,6 +227,10 @@ def _direction(of, quarter=0.25, turns=1.0, unit=True):
 
 def _tangents(a, b):
     return np.tan(a), np.tan(b), 1.0
+
+
+def _sines(a, b):
+    return np.sin(a), np.sin(b), np.sqrt(max(0, 1 - np.sin(a) ** 2 - np.sin(b) ** 2))
 
 
 def rays(rng, most):
@@ -546,10 +560,13 @@ STATIONS = [
                 "You put the sines beside z = 1. x / z and y / z are the tangents.",
                 id="ray_direction-sines",
             ),
-            Mistake(
-                _direction(lambda a, b: (np.sin(a), np.sin(b), np.sqrt(max(0, 1 - np.sin(a) ** 2 - np.sin(b) ** 2)))),
-                "You take the sines of the angles as the first two parts of the direction. The planes cut at x / z = tan alpha, y / z = tan beta.",
-                id="ray_direction-cosines",
+            *(
+                Mistake(
+                    _direction(_sines, unit=unit),
+                    "You take the sines of the angles as the first two parts of the direction. The planes cut at x / z = tan alpha, y / z = tan beta.",
+                    id=f"ray_direction-cosines{words}",
+                )
+                for unit, words in ((True, ""), (False, "-of-any-length"))
             ),
             Mistake(
                 _direction(lambda a, b: (a, b, 1.0)),
@@ -850,6 +867,14 @@ CELL = [
                 lambda W, E0, E1, P: P @ invert(E0) @ E1,
                 "You applied the tracker's own motion, E0 to E1, to the part's frame. The two frames are not one: go through T_EP.",
                 id="moved_part-own-motion",
+            ),
+            Mistake(
+                lambda W, E0, E1, P: pose(
+                    cell.moved_part(W, E0, E1, P)[:3, :3], P[:3, 3] + W[:3, :3] @ (E1[:3, 3] - E0[:3, 3])
+                ),
+                "The part turns as it should, but its origin moves as far as that of the tracker. It sits beside the tracker, and the turn swings it "
+                "round: go through T_EP.",
+                id="moved_part-without-lever",
             ),
             Mistake(
                 lambda W, E0, E1, P: W @ E1,

@@ -1101,11 +1101,16 @@ CHAPTER = Chapter(
                     )
                     for nearest in (lie.nearest_rotation, _orthonormal)
                 ),
-                Mistake(
-                    lambda M: lie.nearest_rotation((X := _null(M).reshape(3, 3, order="F")) * np.sign(np.trace(X))),
-                    "You made the trace positive, but a turn by more than 90 deg may have a negative one. The sign that a rotation needs is that of "
-                    "its determinant.",
-                    id="rotation_from_nullvector-trace",
+                *(
+                    Mistake(
+                        lambda M, nearest=nearest: nearest(
+                            (X := _null(M).reshape(3, 3, order="F")) * np.sign(np.trace(X))
+                        ),
+                        "You made the trace positive, but a turn by more than 90 deg may have a negative one. The sign that a rotation needs is that of "
+                        "its determinant.",
+                        id=f"rotation_from_nullvector-trace{words}",
+                    )
+                    for nearest, words in ((lie.nearest_rotation, ""), (_orthonormal, "-as-it-comes"))
                 ),
                 Mistake(
                     lambda M: lie.nearest_rotation(_null(M).reshape(3, 3, order="F")),

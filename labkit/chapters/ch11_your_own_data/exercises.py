@@ -810,6 +810,9 @@ CHAPTER = Chapter(
                         "You took the reading as free of noise. Whitened, its covariance is I: J C J^T + I."),
                 Mistake(lambda C, J: C - (lambda K: K @ K.T)(C @ J.T @ np.linalg.inv(J @ C @ J.T + np.eye(len(J)))),
                         "Between the gain K and its transpose the covariance of the reading is missing: C - K (J C J^T + I) K^T, or C - K J C."),
+                Mistake(lambda C, J: C - C @ np.linalg.inv(C + np.linalg.pinv(J.T @ J)) @ C,
+                        "You made a covariance of J^T J. Where the reading has fewer numbers than there are parameters, `pinv` makes it 0 in all it does not see, "
+                        "as if that were known exactly: add J^T J to the inverse of C."),
                 Mistake(lambda C, J: C - C @ J.T @ J @ C, "This is the first step toward it. The change is not small: (C^-1 + J^T J)^-1, or J C J^T + I between."),
                 Mistake(lambda C, J: np.linalg.inv(np.linalg.inv(C) + 2 * J.T @ J), "You counted the reading twice."),
                 Mistake(lambda C, J: np.linalg.inv(2 * np.linalg.inv(C) + J.T @ J), "You counted the data you have twice."),
