@@ -689,10 +689,12 @@ class _Trial:
         draws = self._cases()
         if self.exercise.metric is None or not draws or not self.budget.left():
             return None
-        unread, names = _unread(self.function), self._names(draws[0][0])
+        told = dict.fromkeys(rerun.read_for_size(self.function), "uses only the size of")
+        told |= dict.fromkeys(_unread(self.function), "never uses")
+        names = self._names(draws[0][0])
         for k, name in enumerate(names):
-            if name in unread and any(self._moves(k, *pair) for pair in self._exchanges(k, draws)):
-                return f"your function never uses `{name}`, and its result should change with it"
+            if name in told and any(self._moves(k, *pair) for pair in self._exchanges(k, draws)):
+                return f"your function {told[name]} `{name}`, and its result should change with it"
         for k, name in enumerate(names):
             least = LIKE_CHANCE if self._is_choice() else 2
             if self._makes_no_difference(k, draws) and self._makes_no_difference(k, draws + self._fresh_results, least):

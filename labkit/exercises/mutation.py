@@ -341,7 +341,12 @@ def mending(function):
     found += _with_an_axis(function)
     found = [*_finer(function), *found, *_counted_by_loops(function), *_everywhere(found)]
     found += [*_finer_differences(function), *_with_an_outer_product(function), *_of_rounds(function)]
-    found += [*_begun_late(function), *_typed_numbers(function), *_exchanged_throughout(function)]
+    found += [
+        *_begun_late(function),
+        *_typed_numbers(function),
+        *_exchanged_throughout(function),
+        *_from_the_first(function),
+    ]
     found += [*_shorter_steps(function), *_rounded_pi(function), *_never_reached(function), *_unstacked(function)]
     found += _lost_signs(function)
     found += _sizes(function)
@@ -574,6 +579,30 @@ def _begun_late(function):
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "range" and len(node.args) == 2:
             mends = f"the loop begins at `{ast.unparse(node.args[0])}`, and belongs from 0 on"
             yield Change("", mends, 2, node, ((node, "args", node.args[1:]),))
+
+
+def _from_the_first(function):
+    """Second entries, as `time[1]`, from which the first is subtracted: a step where nothing has to begin at 0."""
+    for owner in ast.walk(function):
+        for field, content in ast.iter_fields(owner):
+            for i, node in enumerate(content if isinstance(content, list) else [content]):
+                if _is_second(node):
+                    first = ast.Subscript(node.value, ast.Constant(0), ast.Load())
+                    new = ast.BinOp(node, ast.Sub(), first)
+                    _locate(new, node)
+                    whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
+                    mends = f"`{ast.unparse(first)}` is to be subtracted"
+                    yield Change("", mends, 2, node, ((owner, field, whole),))
+
+
+def _is_second(node):
+    if (
+        not isinstance(node, ast.Subscript)
+        or not isinstance(node.ctx, ast.Load)
+        or not isinstance(node.value, ast.Name)
+    ):
+        return False
+    return isinstance(node.slice, ast.Constant) and node.slice.value == 1 and type(node.slice.value) is int
 
 
 def _typed_numbers(function):

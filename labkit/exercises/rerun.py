@@ -31,6 +31,7 @@ WITHIN = "` in `"  # between a part of the code and the larger one in which it i
 OPAQUE = {"locals", "globals", "vars", "eval", "exec", "super", "breakpoint"}  # what code says of itself
 OUTSIDE = {"open", "write", "write_text", "write_bytes", "touch", "mkdir", "unlink", "remove", "rename", "savetxt"}
 OUTSIDE |= {"save", "savez", "tofile", "dump", "to_csv", "system", "run", "Popen", "sendto", "send", "connect"}
+SIZES, OF_A_SIZE = {"shape", "ndim", "size"}, {"len", "shape", "ndim", "size", "zeros_like", "ones_like", "empty_like"}
 UNREAD = ast.Global | ast.Nonlocal | ast.Yield | ast.Await  # in a function that is not run again
 
 
@@ -53,6 +54,19 @@ def written(function):
     for _, _, more in beside:
         lines = lines | more
     return Written(function, tree, lines, [(helper, definition) for helper, definition, _ in beside])
+
+
+def read_for_size(function):
+    """Names of the arguments of which a function reads how large they are, and nothing else."""
+    trees = getattr(written(function), "trees", None)  # none where its code cannot be read
+    if not trees:
+        return set()
+    named = [n for n in ast.walk(trees[0]) if isinstance(n, ast.Name)]
+    sized = [n.value for n in ast.walk(trees[0]) if isinstance(n, ast.Attribute) and n.attr in SIZES]
+    calls = [n for n in ast.walk(trees[0]) if isinstance(n, ast.Call) and n.args]
+    sized += [n.args[0] for n in calls if getattr(n.func, "attr", getattr(n.func, "id", "")) in OF_A_SIZE]
+    arguments = {argument.arg for argument in trees[0].args.args}
+    return (arguments & {n.id for n in sized if isinstance(n, ast.Name)}) - {n.id for n in named if n not in sized}
 
 
 def _beside(function, tree):
@@ -81,9 +95,9 @@ def _read(function):
     try:
         text = textwrap.dedent("".join(inspect.getblock(cell[code.co_firstlineno - 1 :])))
         module = ast.parse(text)
+        node = module.body[0]
     except (SyntaxError, ValueError, IndexError, RecursionError):
         return None
-    node = module.body[0]
     if not isinstance(node, ast.FunctionDef) or not (_makes(text, code) or _makes("".join(cell), code)):
         return None
     names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}

@@ -379,9 +379,20 @@ def test_the_condition_that_was_met_where_it_is_wrong_is_told():
     assert "draws it was wrong exactly where `a[k] * b[k] > 0.5` (line 4) was true in some round" in said
 
 
+def test_a_step_is_the_second_entry_less_the_first():
+    item = replace(
+        ITEM,
+        draw=lambda rng: (rng.uniform(3, 5) + 0.2 * np.arange(9), rng.normal(size=9)),
+        reference=lambda a, b: (a[1] - a[0]) * b.sum(),
+    )
+    said = item.judge(typed("h, n = a[1], len(a)\nreturn h * sum(b[:n])"), rng=np.random.default_rng(0)).text
+    assert "in line 2, `a[1]`: `a[0]` is to be subtracted. With this alone changed, your result is right." in said
+
+
 def test_a_result_that_never_changes_is_told():
     said = ITEM.judge(typed("return 3.7"), rng=np.random.default_rng(0)).text
     assert "your function never uses `a`" in said
+    assert "your function uses only the size of `b`, and" in told("return len(b) * a.sum() + np.zeros_like(b)[0]")
     item = replace(ITEM, draw=lambda rng: ({"a": rng.normal()}, {"b": 1.0}), reference=lambda a, b: a["a"])
     said = item.judge(typed("return 3.7 + 0 * len(a) * len(b)"), rng=np.random.default_rng(0)).text
     assert "Your result is the same on every draw" in said
@@ -609,9 +620,9 @@ def solved_by(monkeypatch, text):
 
 
 def test_an_entry_that_is_bound_is_not_taken_for_a_right_step(monkeypatch):
-    text = "def formula(a, b):\n    d = b[1] - b[0]\n    return a * np.sin(d) + b[0] * b[2]\n"
+    text = "def formula(a, b):\n    d = b[2] - b[0]\n    return a * np.sin(d) + b[0] * b[1]\n"
     reference = solved_by(monkeypatch, text)
-    said = judged(asked(reference, far_apart), "d, e = b[1], b[2]\nreturn a * np.sin(d) + b[0] * e")
+    said = judged(asked(reference, far_apart), "d, e = b[2], b[1]\nreturn a * np.sin(d) + b[0] * e")
     assert "in line 2, `d`" in said and "As far as" not in said
 
 
