@@ -1141,7 +1141,7 @@ ADVICE = {  # what NumPy means, by a regular expression
     "truth value of an array": "`if` takes one truth value; `np.where` chooses entry by entry.",
     "bitwise_xor": "`^` is no power in Python: write `**`.",
     r"for \^: ": "`^` is no power in Python: write `**`.",
-    "is out of bounds for axis": "Indices count from 0; of a matrix the row comes first: [row, column].",
+    r"out of bounds for axis .* \d+$": "Indices count from 0; of a matrix the row comes first: [row, column].",
     "math domain error": "A root of a negative number, or an arccosine beyond 1, perhaps by rounding: see `np.clip`.",
     "requires a buffer of": "The format and the data differ in length: in `struct`, d takes 8 bytes, f takes 4.",
     "'list' object has no attribute": "A list is no array: `np.array(...)` makes one of it.",
@@ -1183,6 +1183,8 @@ def _short(value):
         return words.replace("\n", "")
     if inspect.isfunction(value):
         return value.__name__
+    if isinstance(value, np.random.Generator):
+        return "<Generator>"
     text = f"{value:.6g}" if isinstance(value, float) else repr(value)
     return text if len(text) <= 60 else f"<{type(value).__name__}>"
 

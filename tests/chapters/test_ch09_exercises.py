@@ -107,6 +107,7 @@ def test_every_single_ray_tells_a_forgotten_heading(seed):
 def test_a_test_that_lets_the_specimen_raise_is_told_to_catch():
     outcome = judge("hunt_3", lambda resample, rng: resample(np.full(1000, 0.000999), rng).max() < 1000)
     assert outcome.status == RAISED and "except IndexError" in outcome.text
+    assert "the row comes first" not in outcome.text and "rng=<Generator>" in outcome.text
 
 
 def test_recover_in_another_order_is_named():

@@ -2519,7 +2519,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda w, rng: rng.choice(len(w), len(w), replace=False, p=w / w.sum()),
-                    "replace=False draws each index once at most. A heavy particle must be drawn several times: leave it out.",
+                    "With replace=False each index is drawn once at most, and a heavy particle must come out several times: leave replace=False out.",
                 ),
             ],
             draws=8,

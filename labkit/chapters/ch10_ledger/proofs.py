@@ -287,7 +287,8 @@ BOUND = Exercise(
         ),
         Mistake(
             lambda f, p: np.abs(np.subtract(*_moves(f, p))).sum() / 2,
-            "Half of the way from down to up is the mean of the two moves. The larger one counts.",
+            "You took the mean of the way up and the way down, which is half of the way from down to up. The larger of "
+            "the two counts.",
         ),
         Mistake(
             lambda f, p: np.abs(np.subtract(*_moves(f, p))).sum(),
