@@ -5,7 +5,7 @@ do.
 import pytest
 from hypothesis import settings
 
-from labkit.exercises import engine
+from labkit.exercises import budget
 
 settings.register_profile("the same examples each time", derandomize=True, database=None, deadline=None)
 settings.load_profile("the same examples each time")
@@ -20,7 +20,7 @@ def own_progress(tmp_path, monkeypatch):
 @pytest.fixture(autouse=True)
 def looks_for_explanations_to_the_end(monkeypatch):
     """Else a slow processor would leave wrong answers unexplained that a fast one explains."""
-    monkeypatch.setattr(engine, "LOOKING", 30.0)
+    monkeypatch.setattr(budget, "LOOKING", 30.0)
 
 
 @pytest.fixture

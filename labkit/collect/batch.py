@@ -14,7 +14,8 @@ import threading
 import time
 from pathlib import Path
 
-from ..exercises.engine import CORRECT, NOT_YET, RAISED, TO_DO, Prediction
+from ..exercises.engine import Prediction
+from ..exercises.outcome import CORRECT, NOT_YET, RAISED, TO_DO
 from ..reading import regular
 from . import judge, library, sandbox, submissions
 from .submissions import Unreadable

@@ -12,8 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..exercises import engine, guard, session
-from ..exercises.engine import CORRECT, NOT_YET, RAISED, TO_DO, Exercise, Outcome, Prediction, Value
+from ..exercises import budget, guard, session
+from ..exercises.engine import Exercise, Prediction
+from ..exercises.outcome import CORRECT, NOT_YET, RAISED, TO_DO, Outcome
+from ..exercises.value import Value
 from ..tables import DATA
 from . import library, sandbox, wire
 from .border import Border, run_trusted
@@ -52,7 +54,7 @@ class Plan:
 def judge(chapter, cells, seed, key):
     """The `Verdicts` on the code cells of one notebook; draws follow from `seed` and `key`, which names the file."""
     plan, until = Plan(), time.monotonic() + WHOLE
-    engine.LOOKING = LOOKING
+    budget.LOOKING = LOOKING
     stopped = []
     for _ in range(TURNS):
         run = Session(chapter, seed, key, plan)

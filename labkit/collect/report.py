@@ -7,7 +7,8 @@ import re
 from collections import Counter
 from dataclasses import dataclass, field
 
-from ..exercises.engine import Prediction, Value
+from ..exercises.engine import Prediction
+from ..exercises.value import Value
 from ..reading import regular
 from . import library
 

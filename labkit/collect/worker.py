@@ -147,7 +147,7 @@ class Worker:
 
     @staticmethod
     def _is_blank(answer):
-        from labkit.exercises.engine import is_blank
+        from labkit.exercises.outcome import is_blank
 
         return is_blank(answer)
 

@@ -4,6 +4,8 @@ import time
 
 from . import guard
 
+LOOKING = 1.2  # seconds of processor time, from the beginning of a check, in which an explanation is looked for
+SPECIAL = 0.8  # more, where an answer is right on some draws only, for what the others have in common
 PART = 0.25  # of a budget that one kind of explanation may take
 
 

@@ -6,7 +6,7 @@ import ipywidgets
 from IPython.display import display
 
 from .. import live
-from .engine import CORRECT, NOT_YET, RAISED, TO_DO
+from .outcome import CORRECT, NOT_YET, RAISED, TO_DO
 
 SIGNS = {TO_DO: "○", NOT_YET: "✗", CORRECT: "✓", RAISED: "!"}
 COLORS = {

@@ -14,9 +14,11 @@ import ipywidgets
 import numpy as np
 
 from ..places import ROOT
-from . import engine, feedback, guard, kept, progress, source
-from .engine import CORRECT, NOT_YET, RAISED, TO_DO, Prediction, Value
+from . import feedback, guard, kept, progress, source
+from .engine import Prediction
 from .feedback import Named, Panel
+from .outcome import CORRECT, NOT_YET, RAISED, TO_DO, is_blank
+from .value import Value
 
 CHAPTERS = "labkit.chapters"  # found by name: the engine imports no chapter
 SOLUTIONS = ROOT / "solutions"
@@ -285,12 +287,12 @@ def ask(chapter, item, answer, reveal):
     """Lock in a prediction and reveal; or show the question with its choices, and reveal after a click."""
     locked = [e["answer"] for e in progress.of(chapter.name, item.id) if e["event"] == "predicted" and "answer" in e]
     if is_strict():
-        if engine.is_blank(answer) or not item.is_right(item.read(answer)):
-            missing = TO_DO if engine.is_blank(answer) else "not the right one"
+        if is_blank(answer) or not item.is_right(item.read(answer)):
+            missing = TO_DO if is_blank(answer) else "not the right one"
             raise NotCorrect(f"{item.id}: the prediction is {missing}")
         locked = []
     given = None
-    if not engine.is_blank(answer):
+    if not is_blank(answer):
         try:
             given = item.read(answer)
         except ValueError as error:

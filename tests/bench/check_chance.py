@@ -17,7 +17,8 @@ import time
 import numpy as np
 
 from labkit.exercises import session, source
-from labkit.exercises.engine import CORRECT, NOT_YET, Exercise
+from labkit.exercises.engine import Exercise
+from labkit.exercises.outcome import CORRECT, NOT_YET
 
 
 def oddities(item, seconds):

@@ -18,8 +18,10 @@ from pathlib import Path
 
 import numpy as np
 
-from labkit.exercises import engine, mutation, session, slips
-from labkit.exercises.engine import CORRECT, NOT_YET, Exercise
+from labkit.exercises import mutation, session, slips
+from labkit.exercises.engine import Exercise
+from labkit.exercises.outcome import CORRECT, NOT_YET
+from labkit.exercises.trial import Trial
 
 REASONS = Path(__file__).with_name("mutants.csv")
 LIMIT = 2.0  # seconds a call of a changed function may take
@@ -76,7 +78,7 @@ def main():
     wanted = parser.parse_args()
     warnings.simplefilter("ignore")
     os.environ.setdefault("LABKIT_PROGRESS", os.devnull)
-    engine._Trial.verdict = quick_verdict
+    Trial.verdict = quick_verdict
     known, table, open_ = reasons(), collections.defaultdict(lambda: np.zeros(3, dtype=int)), []
     try:
         for chapter in session.chapters():

@@ -13,8 +13,8 @@ from labkit.chapters.ch02_chaining import stages as chaining
 from labkit.chapters.ch05_hand_eye import stages as hand_eye
 from labkit.chapters.ch06_tracker import stages
 from labkit.chapters.ch09_monte_carlo import stages as monte_carlo
-from labkit.exercises.engine import NOT_YET
 from labkit.exercises.feedback import Panel
+from labkit.exercises.outcome import NOT_YET
 from labkit.stage import Stage, Toggle, View, front
 from labkit.stage import scene3d_solids as solids
 from labkit.stage.scene3d import Scene

@@ -10,11 +10,10 @@ from labkit.chapters.ch04_optimization import beyond
 from labkit.chapters.ch04_optimization.exercises import CHAPTER
 from labkit.documents.thesis import wells
 from labkit.estimation import optimization as opt
-from labkit.exercises.engine import CORRECT, NOT_YET
-from tests.chapters.draws_of_a_check import is_missed, one_check
+from labkit.exercises.outcome import CORRECT, NOT_YET
+from tests.chapters.draws_of_a_check import SEEDS, is_missed, one_check
 
 ITEMS = {item.id: item for item in CHAPTER.items}
-SEEDS = range(2)
 
 
 def judged(name, answer, seed=0):
@@ -172,7 +171,7 @@ def test_the_tipping_weight_draws_level():
     assert 9 + 8 + 6 + 3 * w == pytest.approx(3 + 3 + 8 + 8 * w)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("good, grown", [(0.9, 2), (0.75, 3)])
 def test_a_trust_region_follows_the_stated_rule(seed, good, grown):
     def follow(radius, length, rho):
@@ -323,7 +322,7 @@ def without_little_damping(r, J, damping):
     return opt.damped_step(r, J, damping if damping > 1e-3 else 0.0)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(
     "name, answer",
     [
@@ -339,7 +338,7 @@ def test_faint_curvatures_narrow_valleys_and_promised_rises_are_drawn(name, answ
     assert ITEMS[name].judge(answer, rng=np.random.default_rng(seed)).status == NOT_YET
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_poor_step_that_is_taken_shrinks_the_radius_in_every_check(seed):
     assert is_wrong_in_a_check("trust_region", beyond.loop(follow=beyond.shrunk_where_taken_back), seed)
 
@@ -363,7 +362,7 @@ def at_the_limit(g, H):
     return "not stationary" if math.hypot(*g) >= 1e-6 else kind(H)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(
     "name, answer",
     [
@@ -500,7 +499,7 @@ def test_what_the_docstring_admits_is_drawn_in_every_check(name, answer):
     assert is_wrong_in_a_check(name, answer)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_smaller_limit_is_told_and_no_length_is_an_angle(seed):
     outcome = judged("classify_extremum", lambda g, H: "not stationary" if np.linalg.norm(g) > 1e-8 else kind(H), seed)
     assert "your limit is smaller than the stated one" in outcome.text

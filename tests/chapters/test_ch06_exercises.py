@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from labkit.chapters.ch06_tracker import exercises as ch06
-from labkit.exercises.engine import CORRECT, NOT_YET
+from labkit.exercises.outcome import CORRECT, NOT_YET
 from labkit.geometry import frames
 from labkit.geometry.lie import exp_so3, nearest_rotation
 from labkit.machines import arm, log
+from tests.chapters.draws_of_a_check import SEEDS
 
 ITEMS = {item.id: item for item in ch06.CHAPTER.items}
-SEEDS = range(2)
 
 
 def texts(name, answer, status=NOT_YET):

@@ -7,16 +7,17 @@ from scipy import stats
 from labkit.chapters.ch08_kalman import exercises as ch08
 from labkit.chapters.ch08_kalman import stages
 from labkit.estimation import kalman
-from labkit.exercises import engine
-from labkit.exercises.engine import CORRECT, NOT_YET, RAISED
+from labkit.exercises import budget
+from labkit.exercises.outcome import CORRECT, NOT_YET, RAISED
 from labkit.geometry.planar import wrap_angle
 from labkit.localization import ekf, odometry
+from tests.chapters.draws_of_a_check import SEEDS
 
 ITEMS = {item.id: item for item in ch08.CHAPTER.items}
 RIGHT = {name: getattr(ch08, name) for name in ITEMS if hasattr(ch08, name)}
 
 
-def judged(name, answer, seeds=range(2)):
+def judged(name, answer, seeds=SEEDS):
     """Status and texts of an answer on several seeds; the status must not depend on the seed."""
     outcomes = [ITEMS[name].judge(answer, rng=np.random.default_rng(seed)) for seed in seeds]
     assert len({outcome.status for outcome in outcomes}) == 1
@@ -418,8 +419,8 @@ def test_what_once_passed_or_was_told_of_a_coincidence_is_named(name, answer, wo
 
 
 def test_a_rule_that_stops_by_an_absolute_size_meets_tiny_variances(monkeypatch):
-    monkeypatch.setattr(engine, "LOOKING", 0.0)  # what is told is not asked here
-    assert judged("steady_state_gain", stops_by_allclose, seeds=range(2))[0] == NOT_YET
+    monkeypatch.setattr(budget, "LOOKING", 0.0)  # what is told is not asked here
+    assert judged("steady_state_gain", stops_by_allclose, seeds=SEEDS)[0] == NOT_YET
 
 
 def test_a_gate_that_gives_in_after_five_refusals_is_told():
@@ -429,5 +430,5 @@ def test_a_gate_that_gives_in_after_five_refusals_is_told():
         refused[:] = [] if ch08.gate(y, S, limit) else [*refused, y]
         return not refused or len(refused) > 5
 
-    status, texts = judged("gate", gate, seeds=range(2))
+    status, texts = judged("gate", gate, seeds=SEEDS)
     assert status == NOT_YET and all("called twice with the same arguments" in text for text in texts), texts

@@ -12,9 +12,10 @@ from labkit.chapters.ch11_your_own_data import exercises as own
 from labkit.documents.ledger import Computed, Row, judge
 from labkit.documents.rounding import half_unit, read
 from labkit.documents.slips import single_slips
-from labkit.exercises import engine
-from labkit.exercises.engine import CORRECT, NOT_YET
+from labkit.exercises import budget
 from labkit.exercises.metrics import Refused
+from labkit.exercises.outcome import CORRECT, NOT_YET
+from tests.chapters.draws_of_a_check import SEEDS
 
 
 def told_of(module, id, text, **known):
@@ -508,12 +509,12 @@ def cosines_of_seven_digits(T, apart):
     return np.arccos(np.clip(np.round((axes[apart:] * axes[:-apart]).sum(1), 7), -1, 1))
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(
     "module, id, answer", [(ledger, "suspects", everybody), (own, "between_axes", cosines_of_seven_digits)]
 )
 def test_where_nobody_slipped_and_where_angles_are_small(module, id, answer, seed, monkeypatch):
-    monkeypatch.setattr(engine, "LOOKING", 0.0)  # what is told is not asked here
+    monkeypatch.setattr(budget, "LOOKING", 0.0)  # what is told is not asked here
     assert module.CHAPTER[id].judge(answer, rng=np.random.default_rng(seed)).status == NOT_YET
 
 

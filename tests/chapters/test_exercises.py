@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from labkit.exercises import engine, metrics, regions, session, source
-from labkit.exercises.engine import CORRECT, NOT_YET, TO_DO, Exercise, Prediction, Value
+from labkit.exercises.engine import Exercise, Prediction
+from labkit.exercises.outcome import CORRECT, NOT_YET, TO_DO
 from labkit.exercises.typeset import typeset
+from labkit.exercises.value import Value
 
 CHAPTERS = session.chapters()
 ITEMS = [(chapter, item) for chapter in CHAPTERS for item in chapter.items]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from labkit.chapters.ch08_kalman import exercises as ch08
-from labkit.exercises import engine, session
-from labkit.exercises.engine import CORRECT
+from labkit.exercises import budget, session
+from labkit.exercises.outcome import CORRECT
 from labkit.geometry import frames
 from labkit.geometry.planar import wrap_angle
 
@@ -103,8 +103,8 @@ FORGOTTEN = [
 
 @pytest.mark.parametrize("name, forgotten", FORGOTTEN, ids=[f"{name}-{k}" for k, (name, _) in enumerate(FORGOTTEN)])
 def test_who_forgets_a_case_is_refused(name, forgotten, monkeypatch):
-    monkeypatch.setattr(engine, "LOOKING", 0.0)
-    monkeypatch.setattr(engine, "SPECIAL", 0.0)
+    monkeypatch.setattr(budget, "LOOKING", 0.0)
+    monkeypatch.setattr(budget, "SPECIAL", 0.0)
     right = ITEMS[name].reference
 
     def answer(*given):
@@ -115,7 +115,7 @@ def test_who_forgets_a_case_is_refused(name, forgotten, monkeypatch):
 
 @pytest.mark.parametrize("wrap", [lambda a: a % (2 * np.pi), lambda a: abs(wrap_angle(a)), lambda a: a + 2 * np.pi])
 def test_innovations_to_either_side_and_off_the_seam_are_wrapped(wrap, monkeypatch):
-    monkeypatch.setattr(engine, "LOOKING", 0.0)
+    monkeypatch.setattr(budget, "LOOKING", 0.0)
     assert ITEMS["ekf_step"].judge(ch08._ekf(wrap=wrap), rng=np.random.default_rng(0)).status != CORRECT
 
 
@@ -132,7 +132,7 @@ def test_a_gain_above_one_is_drawn_and_held(monkeypatch):
         K = np.clip(cov @ C.T @ np.linalg.inv(C @ cov @ C.T + cov_z), -1, 1)
         return x + K @ (z - C @ x), (np.eye(len(x)) - K @ C) @ cov
 
-    monkeypatch.setattr(engine, "LOOKING", 0.0)
+    monkeypatch.setattr(budget, "LOOKING", 0.0)
     assert all(ITEMS["update"].judge(clipped, rng=np.random.default_rng(seed)).status != CORRECT for seed in range(3))
 
 
@@ -212,7 +212,7 @@ def test_two_motions_and_twenty_are_in_every_check(name):
 
 
 def test_weights_of_zero_keep_their_places(monkeypatch):
-    monkeypatch.setattr(engine, "LOOKING", 0.0)
+    monkeypatch.setattr(budget, "LOOKING", 0.0)
 
     def without_zeros(weights, rng):
         left = weights[weights > 0]
@@ -231,7 +231,7 @@ def test_what_is_returned_is_not_called_right_on_the_way():
 
 
 def test_what_leaves_directions_out_is_refused_where_axes_are_nearly_alike(monkeypatch):
-    monkeypatch.setattr(engine, "LOOKING", 0.0)
+    monkeypatch.setattr(budget, "LOOKING", 0.0)
 
     def cut(A, B, R):
         K1 = (np.eye(3) - A[:, :3, :3]).reshape(-1, 3)

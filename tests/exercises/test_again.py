@@ -6,7 +6,8 @@ import numpy as np
 
 from labkit.exercises import metrics
 from labkit.exercises.again import Again
-from labkit.exercises.engine import MORE_CASES, Exercise
+from labkit.exercises.engine import Exercise
+from labkit.exercises.evidence import MORE_CASES
 
 
 def test_each_draw_is_made_once_and_handed_out_as_a_copy():

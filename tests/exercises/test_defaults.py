@@ -3,7 +3,8 @@
 import numpy as np
 
 from labkit.exercises import metrics
-from labkit.exercises.engine import CORRECT, Exercise
+from labkit.exercises.engine import Exercise
+from labkit.exercises.outcome import CORRECT
 
 DOUBLE = Exercise(
     "double",

@@ -19,9 +19,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from labkit.chapters.ch01_frames.exercises import CHAPTER, random_pose
-from labkit.exercises import engine, feedback, guard, metrics, progress, session, source
-from labkit.exercises.engine import CORRECT, NOT_YET, RAISED, TO_DO, Chapter, Exercise, Mistake, Prediction, Value
+from labkit.exercises import feedback, guard, metrics, progress, session, slips, source, staying
+from labkit.exercises.engine import Chapter, Exercise, Prediction
 from labkit.exercises.feedback import Panel
+from labkit.exercises.outcome import CORRECT, NOT_YET, RAISED, TO_DO, Mistake
+from labkit.exercises.trial import Trial
+from labkit.exercises.value import Value
+from labkit.exercises.wording import short
 from labkit.geometry import frames
 from labkit.geometry.lie import exp_so3
 
@@ -405,8 +409,8 @@ def test_what_numpy_means(answer, words):
 
 
 def test_small_arguments_keep_their_digits():
-    assert engine._short(np.array([4e-8, -1.0e-9])) == "[ 4.e-08, -1.e-09]"
-    assert engine._short(np.array([4e-8, 2.0])) == "[0., 2.]"
+    assert short(np.array([4e-8, -1.0e-9])) == "[ 4.e-08, -1.e-09]"
+    assert short(np.array([4e-8, 2.0])) == "[0., 2.]"
 
 
 def test_a_near_wrong_value_is_told_from_a_rounded_right_one():
@@ -447,7 +451,7 @@ def test_one_array_for_two_results_is_told_its_shape():
 
 
 def test_a_function_among_the_arguments_is_shown_by_its_name():
-    assert engine._short(asserting) == "asserting"
+    assert short(asserting) == "asserting"
 
 
 def test_a_word_written_otherwise_is_told_how_it_is_written():
@@ -843,13 +847,13 @@ def test_an_edition_for_exams_has_starters_and_no_solutions(capsys, monkeypatch,
 def test_a_mistake_keeps_its_id_when_others_come_before_it_or_its_sentence_is_improved():
     def ids(*mistakes):
         hints = ("a", "b", "c")
-        return [m.id for m in engine.Value("n", reference=lambda: 1.0, hints=hints, mistakes=mistakes).mistakes]
+        return [m.id for m in Value("n", reference=lambda: 1.0, hints=hints, mistakes=mistakes).mistakes]
 
-    first, second = engine.Mistake(lambda: 2.0, "Twice."), engine.Mistake(lambda: 3.0, "Thrice.")
-    same, again = ids(first, engine.Mistake(lambda: -2.0, "Twice."))
+    first, second = Mistake(lambda: 2.0, "Twice."), Mistake(lambda: 3.0, "Thrice.")
+    same, again = ids(first, Mistake(lambda: -2.0, "Twice."))
     assert same == "n-e82e28" and again == "n-e82e28-2"
     assert ids(second, first)[1] == same
-    assert ids(engine.Mistake(lambda: 2.0, "That is twice as much.", id=same)) == [same]
+    assert ids(Mistake(lambda: 2.0, "That is twice as much.", id=same)) == [same]
 
 
 def test_progress_records_which_mistake_it_was():
@@ -1162,7 +1166,7 @@ def test_an_answer_that_is_slow_is_called_once_more_at_most():
 
     def slow(v):
         calls.append(1)
-        until = time.thread_time() + engine.REPEATING
+        until = time.thread_time() + staying.REPEATING
         while time.thread_time() < until:
             pass
         return 2 * v
@@ -1195,11 +1199,11 @@ def test_constants_of_any_shape_are_no_arguments_that_are_read():
 @pytest.mark.parametrize("times, told", [(0, False), (3, True)])
 def test_a_result_that_never_changes_is_no_slip_of_a_formula(times, told, monkeypatch):
     """Whatever makes 0 of a formula would explain a 0."""
-    trial, rng = engine._Trial(DOUBLE, lambda v: times * v), np.random.default_rng(0)
+    trial, rng = Trial(DOUBLE, lambda v: times * v), np.random.default_rng(0)
     for _ in range(3):
         trial.draw(DOUBLE.draw(rng), DOUBLE.metric)
     # after the draws: what student code has run beside, the guard puts back
-    monkeypatch.setattr(engine.slips, "changed_formulas", lambda exercise: [("with a slip", lambda v: times * v)])
+    monkeypatch.setattr(slips, "changed_formulas", lambda exercise: [("with a slip", lambda v: times * v)])
     assert bool(trial._one_change()) == told
 
 

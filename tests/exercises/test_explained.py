@@ -11,8 +11,12 @@ import textwrap
 import numpy as np
 import pytest
 
-from labkit.exercises import cases, engine, guard, metrics, mutation, operands, shapes
-from labkit.exercises.engine import NOT_YET, Exercise
+from labkit.exercises import budget, cases, guard, metrics, mutation, operands, shapes
+from labkit.exercises.engine import Exercise
+from labkit.exercises.outcome import NOT_YET
+from labkit.exercises.raised import BEFORE
+from labkit.exercises.trial import Trial
+from labkit.exercises.wording import short
 
 RNG = np.random.default_rng(3)
 NUMBERS = metrics.Numbers(1e-9)
@@ -237,7 +241,7 @@ def test_a_change_that_never_ends_is_given_up(monkeypatch):
             left -= abs(std)
         return left + x
 
-    monkeypatch.setattr(engine, "LOOKING", 0.05)
+    monkeypatch.setattr(budget, "LOOKING", 0.05)
     assert "comes out" not in told(exercise(steps, _draw), "return np.sin(x)")
 
 
@@ -275,9 +279,9 @@ def test_what_stops_on_some_draws_only_is_told_where():
 
 
 def test_of_shapes_is_asked_only_where_they_differ():
-    trial = engine._Trial(exercise(lambda x, std: x * std, _draw), None)
+    trial = Trial(exercise(lambda x, std: x * std, _draw), None)
     trial.inputs = [(np.ones(4), 1.0), (np.ones(2), 2.0)]
-    assert trial._before((np.zeros(2), 3.0)) == engine.BEFORE and "shapes" in trial._before((np.ones(3), 1.0))
+    assert trial._before((np.zeros(2), 3.0)) == BEFORE and "shapes" in trial._before((np.ones(3), 1.0))
 
 
 class counted(metrics.Exactly):
@@ -383,8 +387,8 @@ def test_a_vector_and_a_number_that_are_both_wrong_are_compared_apart():
 
 
 def test_numpys_words_and_numbers_are_shown_as_one_types_them():
-    assert engine._short([np.str_("4.5"), np.int64(3)]) == "['4.5', 3]"
-    assert engine._short((np.str_("a"),)) == "('a',)"
+    assert short([np.str_("4.5"), np.int64(3)]) == "['4.5', 3]"
+    assert short((np.str_("a"),)) == "('a',)"
 
 
 LOOPS = {

@@ -10,7 +10,9 @@ from labkit.chapters.ch08_kalman import exercises as ch08
 from labkit.chapters.ch10_ledger import exercises as ch10
 from labkit.documents.lecture import printed as lecture
 from labkit.exercises import metrics
-from labkit.exercises.engine import CORRECT, NOT_YET, Exercise, Value
+from labkit.exercises.engine import Exercise
+from labkit.exercises.outcome import CORRECT, NOT_YET
+from labkit.exercises.value import Value
 from labkit.geometry import planar
 from labkit.localization import ekf, odometry
 

@@ -21,9 +21,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labkit.exercises import engine, guard, kept, metrics, session
-from labkit.exercises.engine import CORRECT, NOT_YET, RAISED, Exercise
+from labkit.exercises import guard, kept, metrics, session
+from labkit.exercises.engine import Exercise
 from labkit.exercises.feedback import Panel
+from labkit.exercises.outcome import CORRECT, NOT_YET, RAISED
+from labkit.exercises.value import Value
 
 DOUBLE = Exercise(
     "double",
@@ -33,7 +35,7 @@ DOUBLE = Exercise(
     hints=("a", "b", "c"),
     limit=0.5,
 )
-ANGLE = engine.Value("angle_deg", reference=lambda: 12.5, unit="deg", hints=("a", "b", "c"))
+ANGLE = Value("angle_deg", reference=lambda: 12.5, unit="deg", hints=("a", "b", "c"))
 
 
 class Evil(Exception):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from labkit.exercises import metrics
-from labkit.exercises.engine import CORRECT, NOT_YET, Exercise
+from labkit.exercises.engine import Exercise
+from labkit.exercises.outcome import CORRECT, NOT_YET
 from labkit.geometry import frames
 from labkit.geometry.lie import exp_so3
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from labkit.exercises import metrics, quantities
-from labkit.exercises.engine import CORRECT, NOT_YET, Value
+from labkit.exercises.outcome import CORRECT, NOT_YET
+from labkit.exercises.value import Value
 
 ROWS = np.random.default_rng(0).normal(size=(9, 3)) + 0.5
 TIP = np.array([-1.7, 44.6, -87.6])

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from labkit.exercises import metrics, relations
-from labkit.exercises.engine import CORRECT, NOT_YET, Mistake, Value
+from labkit.exercises.outcome import CORRECT, NOT_YET, Mistake
+from labkit.exercises.value import Value
 from labkit.geometry.frames import matrix_from_kuka
 from labkit.geometry.lie import exp_so3
 

@@ -8,7 +8,8 @@ import pytest
 from labkit.chapters.ch02_chaining.exercises import CHAPTER as CHAINING
 from labkit.collect import border
 from labkit.exercises import metrics, scope
-from labkit.exercises.engine import CORRECT, NOT_YET, RAISED, Exercise
+from labkit.exercises.engine import Exercise
+from labkit.exercises.outcome import CORRECT, NOT_YET, RAISED
 from labkit.geometry import chaining, frames
 
 CHAIN = CHAINING["chain"]
@@ -94,7 +95,7 @@ def test_of_a_function_in_another_process_no_data_are_seen():
 
 
 def test_each_of_two_results_may_be_a_slip_of_its_own():
-    from labkit.exercises.engine import Mistake
+    from labkit.exercises.outcome import Mistake
 
     two = Exercise(
         "two",

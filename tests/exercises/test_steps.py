@@ -14,7 +14,8 @@ import pytest
 from labkit.chapters.ch04_optimization.exercises import CHAPTER as OPTIMIZATION
 from labkit.exercises import guard, metrics, mutation, rerun, session, steps
 from labkit.exercises.budget import Budget
-from labkit.exercises.engine import CORRECT, NOT_YET, Exercise
+from labkit.exercises.engine import Exercise
+from labkit.exercises.outcome import CORRECT, NOT_YET
 
 
 def typed(body, name="formula", arguments="a, b"):

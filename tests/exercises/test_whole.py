@@ -9,7 +9,7 @@ from labkit.chapters.ch01_frames.exercises import CHAPTER as FRAMES
 from labkit.chapters.ch03_quirlen.exercises import CHAPTER as PIVOT
 from labkit.chapters.ch04_optimization.exercises import CHAPTER as WELLS
 from labkit.chapters.ch06_tracker.exercises import CHAPTER as TRACKER
-from labkit.exercises.engine import CORRECT, NOT_YET
+from labkit.exercises.outcome import CORRECT, NOT_YET
 from labkit.exercises.whole import QUARTER_TURNS, whole
 from labkit.geometry.frames import pose
 from labkit.geometry.lie import exp_so3

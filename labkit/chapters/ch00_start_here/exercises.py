@@ -3,7 +3,8 @@
 import numpy as np
 
 from ...exercises import metrics
-from ...exercises.engine import Chapter, Exercise, Mistake, Prediction
+from ...exercises.engine import Chapter, Exercise, Prediction
+from ...exercises.outcome import Mistake
 
 
 def quarter_turn(p):

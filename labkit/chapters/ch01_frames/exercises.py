@@ -8,8 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from ...documents.lab_sheet.printed import points
 from ...exercises import metrics
-from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...exercises.engine import Chapter, Exercise, Prediction
+from ...exercises.outcome import Mistake
 from ...exercises.special import right_where
+from ...exercises.value import Value
 from ...geometry import frames
 from . import special
 

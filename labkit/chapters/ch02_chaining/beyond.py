@@ -6,7 +6,8 @@ import re
 import numpy as np
 
 from ...exercises import metrics
-from ...exercises.engine import Exercise, Mistake
+from ...exercises.engine import Exercise
+from ...exercises.outcome import Mistake
 from ...exercises.special import right_where
 from ...files.text import number_in
 

@@ -7,8 +7,10 @@ import numpy as np
 from ...calibration import pivot, robust
 from ...documents.lab_sheet import printed as lab_sheet
 from ...exercises import metrics
-from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...exercises.engine import Chapter, Exercise, Prediction
+from ...exercises.outcome import Mistake
 from ...exercises.special import right_where
+from ...exercises.value import Value
 from ...geometry import frames
 from ...geometry.lie import exp_so3
 from . import special

@@ -9,7 +9,9 @@ from ...documents.thesis import wells
 from ...estimation import convexity
 from ...estimation import optimization as opt
 from ...exercises import metrics
-from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...exercises.engine import Chapter, Exercise, Prediction
+from ...exercises.outcome import Mistake
+from ...exercises.value import Value
 from . import beyond
 
 

@@ -8,7 +8,9 @@ from ...calibration import hand_eye, literature
 from ...calibration.planning import poses_that_see
 from ...documents.thesis import printed as thesis
 from ...exercises import metrics
-from ...exercises.engine import Exercise, Mistake, Value
+from ...exercises.engine import Exercise
+from ...exercises.outcome import Mistake
+from ...exercises.value import Value
 from ...geometry import frames
 from ...geometry.lie import exp_so3, nearest_rotation
 from ...machines import robot_accuracy, triangulation

@@ -12,7 +12,9 @@ from ...documents import misprints
 from ...documents.thesis import printed as thesis
 from ...estimation.differences import numeric_jacobian
 from ...exercises import metrics
-from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...exercises.engine import Chapter, Exercise, Prediction
+from ...exercises.outcome import Mistake
+from ...exercises.value import Value
 from ...geometry import frames, lie
 from ...geometry.chaining import orthonormality_error
 from ...geometry.lie import exp_so3, skew

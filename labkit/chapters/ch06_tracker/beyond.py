@@ -10,7 +10,9 @@ from ...documents.report.printed import COLUMNS, table_d
 from ...estimation.optimization import levenberg_marquardt
 from ...exercises import metrics
 from ...exercises.draws import scaled
-from ...exercises.engine import Exercise, Mistake, Prediction, Value
+from ...exercises.engine import Exercise, Prediction
+from ...exercises.outcome import Mistake
+from ...exercises.value import Value
 from ...geometry.frames import invert, matrix_from_quaternion, pose, quaternion_from_matrix, unit_vector
 from ...geometry.lie import exp_so3, skew
 from ...geometry.propagation import error_budget, point_covariance

@@ -10,7 +10,9 @@ from ...documents.report.printed import table_d
 from ...documents.report.reconstruction import stop_poses, synthetic_log, synthetic_mountings
 from ...exercises import metrics
 from ...exercises.draws import scaled
-from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...exercises.engine import Chapter, Exercise, Prediction
+from ...exercises.outcome import Mistake
+from ...exercises.value import Value
 from ...geometry import lie
 from ...geometry.frames import invert, pose, relative, unit_vector
 from ...geometry.lie import exp_so3, log_so3

@@ -7,8 +7,10 @@ import numpy as np
 from ...documents.lecture import printed as lecture
 from ...exercises import metrics
 from ...exercises.draws import scaled
-from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...exercises.engine import Chapter, Exercise, Prediction
+from ...exercises.outcome import Mistake
 from ...exercises.special import right_where
+from ...exercises.value import Value
 from ...geometry.planar import wrap_angle
 from ...localization import lateration, odometry, wheels
 

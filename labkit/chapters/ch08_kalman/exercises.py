@@ -9,7 +9,9 @@ from scipy.linalg import solve_continuous_are
 from ...documents.lecture import printed as lecture
 from ...estimation import kalman
 from ...exercises import metrics
-from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...exercises.engine import Chapter, Exercise, Prediction
+from ...exercises.outcome import Mistake
+from ...exercises.value import Value
 from ...geometry.planar import wrap_angle as wrapped
 from ...localization import ekf, odometry
 

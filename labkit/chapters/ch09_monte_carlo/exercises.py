@@ -11,7 +11,9 @@ from scipy.special import logsumexp, ndtr, ndtri
 from ...documents.lecture.examples import load_building
 from ...exercises import metrics
 from ...exercises.budget import seconds
-from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...exercises.engine import Chapter, Exercise, Prediction
+from ...exercises.outcome import Mistake
+from ...exercises.value import Value
 from ...fast import maps as fast_maps
 from ...geometry import planar
 from ...localization import maps, mcl, odometry, particles

@@ -7,7 +7,8 @@ import numpy as np
 
 from ...documents.rounding import half_unit
 from ...exercises import metrics
-from ...exercises.engine import Chapter, Exercise, Mistake, Prediction
+from ...exercises.engine import Chapter, Exercise, Prediction
+from ...exercises.outcome import Mistake
 from .proofs import BOUND, SUSPECTS
 
 FORMS = (

@@ -9,7 +9,8 @@ import numpy as np
 from ...documents.rounding import half_unit, number, propagate, read
 from ...documents.slips import explained_by, single_slips
 from ...exercises import metrics
-from ...exercises.engine import Exercise, Mistake
+from ...exercises.engine import Exercise
+from ...exercises.outcome import Mistake
 
 # --- propagate a bound ---
 

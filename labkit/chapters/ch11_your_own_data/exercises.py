@@ -9,7 +9,9 @@ from ...calibration import calibrate, motion
 from ...calibration.own_data import Noise
 from ...estimation import influence
 from ...exercises import metrics
-from ...exercises.engine import Chapter, Exercise, Mistake, Prediction, Value
+from ...exercises.engine import Chapter, Exercise, Prediction
+from ...exercises.outcome import Mistake
+from ...exercises.value import Value
 from ...files.poses import read_poses
 from ...files.samples import sample_cell
 from ...geometry.frames import invert, pose

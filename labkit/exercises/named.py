@@ -1,0 +1,104 @@
+"""Which named mistake an answer is: on all draws, by failing alike, or each part of its results by one of its own."""
+
+import copy
+
+import numpy as np
+
+from . import budget, guard, metrics
+from .budget import Budget
+from .evidence import MORE_CASES, Evidence
+from .outcome import NOT_YET
+from .results import Refusal, equal_as_written, failure_of
+
+MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
+
+
+class Named(Evidence):
+    """The mistakes of the exercise, beside what the answer gives."""
+
+    def _named_mistake(self):
+        """The mistake that explains all plain draws, and the special ones too where those alone are wrong."""
+        cases = self._cases()
+        for k, mistake in enumerate(self.exercise.mistakes):
+            if all(self._is_mistake(mistake, *case) for case in cases) and self._is_it_again(mistake):
+                return self.outcome(NOT_YET, mistake.text, k)
+        return None
+
+    def _is_it_again(self, mistake):
+        """Whether an answer is equal to a mistake on fresh draws too, where it is one of several, some of them, or a
+        truth value: two rules may decide alike by chance.
+        """
+        decides = isinstance(self.exercise.metric, metrics.Exactly)
+        if not decides or self.refusal or self._right_on_plain():
+            return True
+        if isinstance(self.pairs[0][1], str):
+            return self._shows_always(mistake)
+        return self._is_it_on(mistake, (self.exercise.plain_again[number] for number in range(MORE_DRAWS)))
+
+    def _shows_always(self, mistake):
+        """Whether an answer is a mistake's wherever that is wrong, at special places too: one of a few words may be the
+        same by another rule, and be wrong on a draw or two.
+        """
+        cases = (self.exercise.all_again[number] for number in range(MORE_CASES + 2 * len(self.exercise.noisy)))
+        return self._is_it_on(mistake, (case for case in cases if self._is_wrong_on(mistake, *case)))
+
+    def _is_wrong_on(self, mistake, args, expected, metric):
+        return not failure_of(mistake, args) and not self._is_mistake(mistake, args, metric, (expected, expected))
+
+    def _is_it_on(self, mistake, cases):
+        """Whether the answer gives what a mistake does on (arguments, expected, metric) of each case."""
+        kind = Budget(budget.SPECIAL)
+        for args, expected, metric in cases:
+            run = guard.run(self.function, args, limit=self.exercise.limit)
+            if run.error is not None or not self._is_mistake(mistake, args, metric, (run.result, expected)):
+                return False
+            if not kind.left():
+                break  # a slow answer is not called more often than it must
+        return True
+
+    def _named_by_failing(self, error, args):
+        """The mistake that explains the draws so far and fails alike on this one: right, or possible, in one size."""
+        if not isinstance(error, ValueError | TypeError | IndexError):
+            return None
+        cases = [*zip(self.inputs, self.metrics, self.pairs)]
+        for k, mistake in enumerate(self.exercise.mistakes):
+            alike = cases and type(failure_of(mistake, args)) is type(error)
+            if alike and all(self._is_mistake(mistake, *case) for case in cases):
+                return self.outcome(NOT_YET, mistake.text, k)
+        return None
+
+    def _named_in_parts(self):
+        """Of several results each may be a slip of its own: then each gets its text."""
+        if not isinstance(self.exercise.metric, metrics.Several) or self.refusal:
+            return None
+        cases = [case[:3] for case in zip(self.inputs, self.metrics, self.pairs, self.words) if case[3] is None]
+        texts, first = {}, None
+        for part, (name, metric, _, _) in enumerate(self.exercise.metric.parts(*cases[0][2])):
+            if all(metric.equal(pair[0][part], pair[1][part]) for _, _, pair in cases):
+                continue
+            k = next((k for k in range(len(self.exercise.mistakes)) if self._is_slip_of(k, part, metric, cases)), None)
+            if k is None:
+                return None
+            texts[name], first = self.exercise.mistakes[k].text, k if first is None else first
+        words = "\n".join(f"{name}: {text}" for name, text in texts.items())
+        return self.outcome(NOT_YET, words, first) if len(texts) > 1 else None
+
+    def _is_slip_of(self, k, part, metric, cases):
+        """Whether one part of the results is that of mistake k on all draws."""
+        try:
+            with np.errstate(all="ignore"), guard.only_finite_matrices():
+                wrong = [self.exercise.mistakes[k].variant(*copy.deepcopy(args))[part] for args, _, _ in cases]
+                same = all(equal_as_written(metric, pair[0][part], w) for (_, _, pair), w in zip(cases, wrong))
+                return same and not all(metric.equal(w, pair[1][part]) for (_, _, pair), w in zip(cases, wrong))
+        except Exception:  # a wrong variant may well fail on a draw: then the answer is not this mistake
+            return False
+
+    def _is_mistake(self, mistake, args, metric, pair):
+        metric = metric or metrics.Numbers(1e-12)
+        try:
+            with np.errstate(all="ignore"), guard.only_finite_matrices():
+                wrong = mistake.variant(*copy.deepcopy(args))
+                result = pair[0].value if isinstance(pair[0], Refusal) else pair[0]
+                return equal_as_written(metric, result, wrong)
+        except Exception:  # a wrong variant may well fail on a draw: then the answer is not this mistake
+            return False

@@ -1,0 +1,109 @@
+"""What is said of an answer that raises: the error in plain words, where, and for which call."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+
+from . import guard, scope
+from . import steps as own_steps
+from .explanations import Explanations
+from .outcome import NOT_YET, RAISED, TO_DO
+from .wording import closed, leading
+
+BEFORE = "It was right before, on other draws: what is different about this one?"
+OTHER_SHAPES = "It was right before, on other draws: what is different about this one, its shapes perhaps?"
+WORDLESS = {  # what is raised without a word
+    MemoryError: "your code asks for more memory than there is",
+    KeyboardInterrupt: "the check was interrupted",
+}
+ADVICE = {  # what NumPy means, by a regular expression
+    r"string to float: .*'[-+\d]*,": "`float` reads 1.5, but not 1,5: replace a decimal comma by a point first.",
+    "must be square": "`solve` and `inv` need as many equations as unknowns; `lstsq` takes more.",
+    "Singular matrix": "The equations do not fix all unknowns: is one missing, or there twice? Has a loop run off?",
+    "Incompatible dimensions": "`lstsq` needs one right side a row of the matrix: is `.ravel()` missing?",
+    "mismatch in its core dimension": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
+    "not aligned": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
+    "can be converted to Python scalars": "`math` and `float` take one number; `np.sin` and the like take arrays.",
+    "inhomogeneous": "The parts of this array have different lengths.",
+    "truth value of an array": "`if` takes one truth value; `np.where` chooses entry by entry.",
+    "bitwise_xor": "`^` is no power in Python: write `**`.",
+    r"for \^: ": "`^` is no power in Python: write `**`.",
+    r"out of bounds for axis .* \d+$": "Indices count from 0; of a matrix the row comes first: [row, column].",
+    "math domain error": "A root of a negative number, or an arccosine beyond 1, perhaps by rounding: see `np.clip`.",
+    "requires a buffer of": "The format and the data differ in length: in `struct`, d takes 8 bytes, f takes 4.",
+    "'list' object has no attribute": "A list is no array: `np.array(...)` makes one of it.",
+    "float' object has no attribute": "Here stands a single number, and no array.",
+    "float64' object has no attribute": "Here stands a single number, and no array.",
+    "float' object is not subscriptable": "Brackets take an entry out of several: here stands a single number.",
+    "remapped shapes": "In `einsum` one letter has one length: here a letter stands for two.",
+    "could not be broadcast": "Entry by entry these shapes do not fit: is `@` meant, is a sum over an axis missing?",
+}
+
+
+class Raised(Explanations):
+    """The error of a call, beside the calls before it."""
+
+    def _raised(self, run, args, words=None):
+        error = run.error
+        if isinstance(error, NotImplementedError):
+            return self.outcome(TO_DO)
+        if isinstance(error, guard.TimeLimit):
+            text = (
+                f"your code did not finish within {self.exercise.limit:g} s: is there a loop without an end,"
+                " or one that tries far more than it must?"
+            )
+            return self.outcome(NOT_YET, text)
+        if isinstance(error, scope.TwinCalled):
+            return self.outcome(
+                NOT_YET, f"your function calls the library's `{error}`: that is the function you are asked to write."
+            )
+        if isinstance(error, guard.Forbidden):
+            return self.outcome(
+                NOT_YET,
+                f"your code calls {error}, which a checked function must not do: it gets its data as arguments.",
+            )
+        if isinstance(error, SystemExit):
+            return self.outcome(NOT_YET, "your code calls exit(): a function ends with `return`.")
+        if isinstance(error, TypeError) and not run.line and "argument" in run.said:
+            wanted = ", ".join(self._names(args) if args else self.exercise.arguments)
+            return self.outcome(NOT_YET, f"your function cannot be called with ({wanted}): {run.said}.")
+        if isinstance(error, NameError) and error.name:
+            where = f"\nin {run.line}" if run.line else ""
+            hint = f"`{error.name}` is not known: has the cell that defines it been run since the kernel started?"
+            return self.outcome(RAISED, f"NameError: {hint}{where}")
+        if isinstance(error, RecursionError):
+            return self.outcome(RAISED, "RecursionError: your function calls itself without an end.")
+        said = run.said or WORDLESS.get(type(error), "" if isinstance(error, AssertionError) else "it says no more")
+        if isinstance(error, AssertionError) and not said:
+            said = "`assert` raises; an answer is handed over with `return`"
+        handed = scope.handed_over(error, dict(zip(self._names(args), args)), self.exercise.reference)
+        advice = handed or next((f". {told}" for words, told in ADVICE.items() if re.search(words, said)), "")
+        if not (advice or args or run.line):
+            advice = ". What your function returned could not be worked with."
+        where = f"\nin {run.line}" if run.line else ""
+        return self.outcome(RAISED, f"{type(error).__name__}: {said}{advice}{where}{self._given(error, args, words)}")
+
+    def _given(self, error, args, words):
+        """The call that raised, as a line; of a property, what it says it gave."""
+        if not args:
+            return f"\nwhen given {error.given}" if hasattr(error, "given") else ""
+        told = f"\nwhen called as {self._call(args)}"
+        if self.pairs and all(m and m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)):
+            told += f"\n{leading(words) or self._special_case(args) or self._before(args)}"
+        return told + self._about_globals()
+
+    def _before(self, args):
+        """That it was right before, and whether shapes may be what is different now."""
+        shapes_before = [[np.shape(arg) for arg in others if isinstance(arg, np.ndarray)] for others in self.inputs]
+        shape = [np.shape(arg) for arg in args if isinstance(arg, np.ndarray)]
+        return BEFORE if shape in shapes_before else OTHER_SHAPES
+
+    def _mended(self, outcome, args, metric, expected):
+        """What was raised, with the change of the student's code that gives the right result, if one does."""
+        if outcome.status != RAISED or metric is None or metric is not self.exercise.metric:
+            return outcome
+        drawn = [own_steps.Case(args, metric, expected), *self._fresh[:2]]
+        search = own_steps.search(self.function, self._names(args), drawn, self._judging(), self.budget)
+        words = search and search.words()
+        return replace(outcome, text=f"{outcome.text}\n{words[0].upper()}{closed(words[1:])}") if words else outcome

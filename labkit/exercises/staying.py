@@ -1,0 +1,115 @@
+"""What stays from one call of an answer to the next: a list that grows, an array that is returned again."""
+
+import copy
+import functools
+import itertools
+
+from . import budget, guard, scope
+from .budget import Budget
+from .evidence import Evidence
+from .results import admitted_by, could_change, is_another, numbers_of, same_numbers
+
+REPEATING = 0.02  # seconds of processor time in which an answer that came out right is called again
+IN_A_ROW = 8  # times that a draw is called then, of each of ...
+ALIKE = 3  # kinds of results at most, where they are words or truth values
+
+
+class Staying(Evidence):
+    """The answer, called again."""
+
+    def _kept(self):
+        """What stays from one call of the function to the next, if its results show it: those of the first draw, or of
+        all where it reads or binds what may stay.
+        """
+        if self.exercise.metric is None:
+            return None
+        draws = range(len(self.inputs) if scope.may_keep(self.function) else len(self.inputs[:1]))
+        told = (self._kept_on(draw) for draw in draws if self.budget.left())
+        return next((words for words in told if words), None)
+
+    def _kept_on(self, draw):
+        before = self.pairs[draw][0]
+        first = numbers_of(before)
+        admitted = functools.partial(admitted_by, self.metrics[draw], self.pairs[draw][1])
+        run = guard.run(self.function, self.inputs[draw], admitted, self.exercise.limit)
+        if first is None:
+            return self._kept_words(run.error) if is_another(before, run) else None
+        if not same_numbers(numbers_of(before), first):
+            return (
+                "your function returns one and the same array at every call: a later call overwrites what an earlier "
+                "one returned. Make the array within the function"
+            )
+        if run.error is None and same_numbers(numbers_of(run.result), first):
+            return None
+        return self._kept_words(run.error)
+
+    def _kept_words(self, error, calls=2):
+        told = "stops with an error" if error is not None else "gives another result"
+        often, at = ("twice", "the second time") if calls == 2 else ("several times", "in the end")
+        return (
+            f"called {often} with the same arguments, your function {told} {at}. Does something stay from "
+            "call to call, a global variable or a default argument that is changed? Or is something drawn at random?"
+        )
+
+    def repeated(self):
+        """What stays from call to call, if an answer that came out right does so no more when it is called again."""
+        if self.exercise.metric is None or "rng" in self.exercise.arguments:
+            return None
+        again = functools.partial(self._again_words, kind=Budget(REPEATING))
+        return guard.run(again, (self.function,), limit=self.exercise.limit + REPEATING, author=self.function).result
+
+    def _again_words(self, function, kind):
+        """`repeated`, in one run of the guard: the calls themselves are quick."""
+        calls = [1] * len(self.inputs)
+        for k in self._in_another_order():
+            metric, (_, expected) = self.metrics[k], self.pairs[k]
+            result, error, calls[k] = None, None, calls[k] + 1
+            try:
+                result = function(*copy.deepcopy(self.inputs[k]))
+            except Exception as raised:
+                error = raised
+            if error is not None or not metric.equal(result, expected):
+                return self._kept_words(error, calls[k])
+            if not kind.left():
+                break  # a slow answer is not called more often than it must
+        return None
+
+    def _in_another_order(self):
+        """Numbers of the draws from the last to the first, words and truth values that are alike together; then some of
+        them many times in a row.
+        """
+        alike = {}
+        for k in reversed([k for k, metric in enumerate(self.metrics) if metric is not None]):
+            expected = self.pairs[k][1]
+            alike.setdefault(expected if isinstance(expected, str | bool | int) else None, []).append(k)
+        often = (numbers[0] for numbers in itertools.islice(alike.values(), ALIKE))
+        return [*itertools.chain(*alike.values()), *(k for k in often for _ in range(IN_A_ROW))]
+
+    def remembered(self, rng):
+        """Whether a function that has something to keep results in finds them again by a part of the arguments, in
+        words; None where it does not.
+
+        Two fresh calls differ in one argument. That of the first is another draw's and need not go with the rest: only
+        the second is judged, which nobody misses who has computed it.
+        """
+        exercise, kind = self.exercise, Budget(budget.SPECIAL)
+        if exercise.metric is None or not self.pairs or not scope.may_keep(self.function):
+            return None
+        for k, name in enumerate(self._names(self.inputs[0])):
+            draw = exercise.cases[k % len(exercise.cases)]
+            args, other = draw(rng), draw(rng)
+            if not kind.left() or k >= min(len(args), len(other)) or not could_change(args[k], other[k]):
+                continue
+            expected = exercise.reference(*copy.deepcopy(args))
+            admitted = functools.partial(admitted_by, exercise.metric, expected)
+            before = guard.run(self.function, (*args[:k], other[k], *args[k + 1 :]), admitted, exercise.limit)
+            run = guard.run(self.function, args, admitted, exercise.limit)
+            if before.error is not None or run.error is not None or exercise.metric.equal(run.result, expected):
+                continue
+            if same_numbers(numbers_of(run.result), numbers_of(before.result)):
+                return (
+                    f"right at first, but called again with another `{name}` and all else as before, your function "
+                    "returns what it returned then, which is right no more: is a result kept, and found again by a "
+                    f"part of the arguments alone?{self._about_globals()}"
+                )
+        return None
