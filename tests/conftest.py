@@ -2,6 +2,8 @@
 do.
 """
 
+import itertools
+
 import pytest
 from hypothesis import settings
 
@@ -11,9 +13,16 @@ settings.register_profile("the same examples each time", derandomize=True, datab
 settings.load_profile("the same examples each time")
 
 
+@pytest.fixture(scope="session")
+def progress_files(tmp_path_factory):
+    """Names of files that nothing has been written to yet."""
+    folder = tmp_path_factory.mktemp("progress")
+    return (str(folder / f"{number}.jsonl") for number in itertools.count())
+
+
 @pytest.fixture(autouse=True)
-def own_progress(tmp_path, monkeypatch):
-    monkeypatch.setenv("LABKIT_PROGRESS", str(tmp_path / "progress.jsonl"))
+def own_progress(progress_files, monkeypatch):
+    monkeypatch.setenv("LABKIT_PROGRESS", next(progress_files))
     monkeypatch.delenv("LABKIT_STRICT", raising=False)
 
 

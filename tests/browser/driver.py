@@ -4,7 +4,9 @@ What has been learned the hard way: commands run before the kernel is idle open 
 commands are therefore not awaited; and every server gets settings and folders of its own.
 """
 
+import atexit
 import contextlib
+import functools
 import json
 import os
 import re
@@ -119,30 +121,38 @@ def wait_for_address(process, log, seconds=90):
     raise RuntimeError(f"JupyterLab did not start:\n{log.read_text(errors='replace')[-3000:]}")
 
 
-@contextlib.contextmanager
-def page_of(browser_path, dark=False, width=1280, height=900, scale=1, calm=False):
-    """A page in a fresh browser, `calm` for a reader who asks for reduced motion; `page.hosts` are the hosts it calls,
-    `page.complaints` the errors in its console.
-    """
+@functools.cache
+def browser_at(path):
+    """The one browser of this process, begun when it is first asked for."""
     from playwright.sync_api import sync_playwright
 
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=browser_path, args=FLAGS)
-        page = browser.new_page(
-            viewport={"width": width, "height": height},
-            device_scale_factor=scale,
-            color_scheme="dark" if dark else "light",
-            reduced_motion="reduce" if calm else "no-preference",
-        )
-        page.hosts, page.complaints = set(), []
-        page.on("request", lambda request: page.hosts.add(urlsplit(request.url).hostname))
-        page.on("websocket", lambda socket: page.hosts.add(urlsplit(socket.url).hostname))
-        page.on("console", lambda m: page.complaints.append(m.text) if m.type == "error" else None)
-        page.on("pageerror", lambda error: page.complaints.append(str(error)))
-        try:
-            yield page
-        finally:
-            browser.close()
+    playwright = sync_playwright().start()
+    browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
+    atexit.register(playwright.stop)
+    atexit.register(browser.close)  # before that
+    return browser
+
+
+@contextlib.contextmanager
+def page_of(browser_path, dark=False, width=1280, height=900, scale=1, calm=False):
+    """A page that shares nothing with others of the browser, `calm` for a reader who asks for reduced motion;
+    `page.hosts` are the hosts it calls, `page.complaints` the errors in its console.
+    """
+    page = browser_at(browser_path).new_page(
+        viewport={"width": width, "height": height},
+        device_scale_factor=scale,
+        color_scheme="dark" if dark else "light",
+        reduced_motion="reduce" if calm else "no-preference",
+    )
+    page.hosts, page.complaints = set(), []
+    page.on("request", lambda request: page.hosts.add(urlsplit(request.url).hostname))
+    page.on("websocket", lambda socket: page.hosts.add(urlsplit(socket.url).hostname))
+    page.on("console", lambda m: page.complaints.append(m.text) if m.type == "error" else None)
+    page.on("pageerror", lambda error: page.complaints.append(str(error)))
+    try:
+        yield page
+    finally:
+        page.close()
 
 
 def open_notebook(page, address, path):

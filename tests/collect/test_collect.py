@@ -155,7 +155,7 @@ def attacked(names, tmp_path, port, monkeypatch):
     monkeypatch.setattr(judge.Session, "_judged", noted)
     monkeypatch.setattr(judge, "HANDED", 100)
     verdicts = judge.judge(library.load(CHAPTER), [text for _, text in cells], 3, "attacks")
-    left = {path.name for path in tmp_path.iterdir()} - {"secret.read", "progress.jsonl"}
+    left = {path.name for path in tmp_path.iterdir()} - {"secret.read"}
     return verdicts, got, left
 
 
