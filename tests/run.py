@@ -9,7 +9,7 @@ Unit tests, solved notebooks (strict) and blank notebooks (lax) are dealt out to
 time than there are processors, since browsers, kernels and judges of a class wait for each other. The last line is the
 sum, "N passed, N failed"; the exit code is 1 if anything failed.
 
-In continuous integration (CI=true) the second half of the unit tests runs with stirred last bits.
+In continuous integration (CI=true) half of the jobs of unit tests runs with stirred last bits.
 A blank notebook that a student has worked in is judged by no test: a fresh one from the source is run in its place.
 """
 
@@ -80,7 +80,7 @@ def split(arguments):
 def stirred_jobs(names, seed):
     """{name: seed} of the jobs that run with stirred last bits."""
     if seed is not None:
-        return {name: seed for name in names if name.startswith(("named", "unit", "solved"))}
+        return {name: seed for name in names if name.startswith(("named", "unit", "collect", "solved"))}
     even = [name for name in names if name.startswith("unit tests") and int(name.split()[-1]) % 2 == 0]
     return dict.fromkeys(even, 1) if os.environ.get("CI") == "true" else {}
 
