@@ -9,6 +9,7 @@ compares a wrong result with what the first give (`slips`), and mends a student'
 import ast
 import contextlib
 import copy
+import functools
 import itertools
 import math
 import re
@@ -138,19 +139,13 @@ def changes(function, most=4):
     """
     found, names, indices = [], _names(function), set(_indices(function))
     places = {node.slice for node in ast.walk(function) if isinstance(node, ast.Subscript)}
-    for owner in ast.walk(function):
-        for field, content in ast.iter_fields(owner):
-            for i, node in enumerate(content if isinstance(content, list) else [content]):
-                if not isinstance(node, ast.AST):
-                    continue
-                for rank, words, new in _changed(node, names):
-                    rank += node in places and rank == 1  # T[3, :3] is 0 in each pose: a term left out says more
-                    if rank <= most:
-                        words = COUNTED if node in indices and words == "with one sign turned" else words
-                        _locate(new, node)
-                        whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
-                        mends = _mends(words, node, new)
-                        found.append(Change(words, mends, rank, node, ((owner, field, whole),)))
+    for node, put in _parts(function):
+        for rank, words, new in _changed(node, names):
+            rank += node in places and rank == 1  # T[3, :3] is 0 in each pose: a term left out says more
+            if rank <= most:
+                words = COUNTED if node in indices and words == "with one sign turned" else words
+                sets = put(new)
+                found.append(Change(words, _mends(words, node, new), rank, node, sets))
     if most:
         found += _statements(function)
     return sorted(found, key=lambda change: change.rank)
@@ -202,32 +197,21 @@ def _rounded_pi(function):
 
 def _sizes(function):
     """The number of all entries of an array, made that of its rows."""
-    for owner in ast.walk(function):
-        for field, content in ast.iter_fields(owner):
-            for i, node in enumerate(content if isinstance(content, list) else [content]):
-                if isinstance(node, ast.Attribute) and node.attr == "size":
-                    new = ast.Call(ast.Name("len", ast.Load()), [node.value], [])
-                    _locate(new, node)
-                    whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
-                    mends = f"it counts all numbers, and `{ast.unparse(new)}` belongs there"
-                    yield Change("", mends, 1, node, ((owner, field, whole),))
+    for node, put in _parts(function):
+        if isinstance(node, ast.Attribute) and node.attr == "size":
+            new = ast.Call(ast.Name("len", ast.Load()), [node.value], [])
+            yield Change("", f"it counts all numbers, and `{ast.unparse(new)}` belongs there", 1, node, put(new))
 
 
 def _lost_signs(function):
     """Roots of 1 less the square of a sine or a cosine: the other of the two, which has a sign."""
     bound = dict(_bound_turns(function))
-    for owner in ast.walk(function):
-        for field, content in ast.iter_fields(owner):
-            for i, node in enumerate(content if isinstance(content, list) else [content]):
-                part = _squared_beside_1(node)
-                turn = bound.get(part.id) if isinstance(part, ast.Name) else part
-                if not _is_turn(turn):
-                    continue
-                new = ast.Call(_numpy(TURNED[_called(turn)], turn).func, turn.args, [])
-                _locate(new, node)
-                whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
-                mends = f"a root is never negative, and `{ast.unparse(new)}` belongs there"
-                yield Change("", mends, 1, node, ((owner, field, whole),))
+    for node, put in _parts(function):
+        part = _squared_beside_1(node)
+        turn = bound.get(part.id) if isinstance(part, ast.Name) else part
+        if _is_turn(turn):
+            new = ast.Call(_numpy(TURNED[_called(turn)], turn).func, turn.args, [])
+            yield Change("", f"a root is never negative, and `{ast.unparse(new)}` belongs there", 1, node, put(new))
 
 
 def _bound_turns(function):
@@ -371,17 +355,11 @@ def _not_repeated(function):
 
 def _with_an_axis(function):
     """Sums, means and the like of all numbers of an array, taken along one axis."""
-    for owner in ast.walk(function):
-        for field, content in ast.iter_fields(owner):
-            for i, node in enumerate(content if isinstance(content, list) else [content]):
-                if not _takes_all(node):
-                    continue
-                for axis in (0, 1):
-                    new = ast.Call(node.func, node.args, [*node.keywords, ast.keyword("axis", ast.Constant(axis))])
-                    _locate(new, node)
-                    whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
-                    mends = f"this takes all numbers together, and `axis={axis}` belongs there"
-                    yield Change("", mends, 1, node, ((owner, field, whole),))
+    for node, put in _parts(function):
+        for axis in (0, 1) if _takes_all(node) else ():
+            new = ast.Call(node.func, node.args, [*node.keywords, ast.keyword("axis", ast.Constant(axis))])
+            mends = f"this takes all numbers together, and `axis={axis}` belongs there"
+            yield Change("", mends, 1, node, put(new))
 
 
 def _unstacked(function):
@@ -583,16 +561,11 @@ def _begun_late(function):
 
 def _from_the_first(function):
     """Second entries, as `time[1]`, from which the first is subtracted: a step where nothing has to begin at 0."""
-    for owner in ast.walk(function):
-        for field, content in ast.iter_fields(owner):
-            for i, node in enumerate(content if isinstance(content, list) else [content]):
-                if _is_second(node):
-                    first = ast.Subscript(node.value, ast.Constant(0), ast.Load())
-                    new = ast.BinOp(node, ast.Sub(), first)
-                    _locate(new, node)
-                    whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
-                    mends = f"`{ast.unparse(first)}` is to be subtracted"
-                    yield Change("", mends, 2, node, ((owner, field, whole),))
+    for node, put in _parts(function):
+        if _is_second(node):
+            first = ast.Subscript(node.value, ast.Constant(0), ast.Load())
+            new = ast.BinOp(node, ast.Sub(), first)
+            yield Change("", f"`{ast.unparse(first)}` is to be subtracted", 2, node, put(new))
 
 
 def _is_second(node):
@@ -672,6 +645,21 @@ def _with_a_millionth(rank, place, sets):
     for _, _, new in sets:
         _locate(new[0] if isinstance(new, list) else new, number)
     return Change("", mends, rank, place, sets)
+
+
+def _parts(function):
+    """(part of the code, function that puts another in its place: what a `Change` sets) of every part."""
+    for owner in ast.walk(function):
+        for field, content in ast.iter_fields(owner):
+            for i, node in enumerate(content if isinstance(content, list) else [content]):
+                if isinstance(node, ast.AST):
+                    yield node, functools.partial(_set_of, owner, field, content, i, node)
+
+
+def _set_of(owner, field, content, i, node, new):
+    _locate(new, node)
+    whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
+    return ((owner, field, whole),)
 
 
 def _locate(new, node):
