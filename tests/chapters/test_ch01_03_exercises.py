@@ -95,6 +95,12 @@ def test_entry_by_entry_is_no_reflection(ones, seed):
     assert "entry by entry" in judged("chain", chain, seed).text
 
 
+def test_what_stands_for_an_unsolved_chain_takes_no_links_as_a_loop_does():
+    """Who writes distribute_closure with P_0 = chain(transforms[:0]) has I there, whoever wrote the chain."""
+    assert np.array_equal(ITEMS["chain"].reference([]), np.eye(4))
+    assert "the library's own function" in judged("chain", chaining.chain).text
+
+
 @pytest.mark.parametrize("first", [0, 1])
 def test_corrected_poses_are_not_links(first):
     def distribute(transforms):
@@ -455,7 +461,7 @@ def before_the_first_comment(text):
         ("closure_error", slide, "slides along the axis"),
         ("read_system", no_exponents, "line 1"),
         ("read_system", comments_and_empty_lines_at_the_margin, ""),
-        ("write_system", lambda points: "\n".join(" ".join(f"{v:.20f}" for v in p) for p in points), "numbers near 0"),
+        ("write_system", lambda points: "\n".join(" ".join(f"{v:.17f}" for v in p) for p in points), "fixed number of"),
         ("pivot_rhs", lambda T: -np.concatenate(np.squeeze(T[:, :3, 3])), "right before, on other draws"),
         ("pivot_residuals", lambda T, tip, point: np.squeeze(T[:, :3, :3] @ tip + T[:, :3, 3] - point), "(1, 3)"),
         ("solve_pivot", even_numbers_of_poses, ""),

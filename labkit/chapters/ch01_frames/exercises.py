@@ -568,7 +568,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda v: v / np.abs(v).max(),
-                    "You divide by the largest component, so that one becomes 1. The length should become 1.",
+                    "You divide by the largest component, its sign aside: that one becomes 1 or -1. The length should become 1.",
+                    id="normalize-a1a562",
                 ),
                 Mistake(
                     lambda v: v / len(v), "`len(v)` counts the components. The length you need is `np.linalg.norm(v)`."
@@ -813,7 +814,9 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda T: _with(T, R=T[:3, :3].T, t=-T[:3, :3] @ T[:3, 3]),
-                    "You rotated the translation by R. On the way back everything turns by Rᵀ.",
+                    "Your translation is -R t. On the way back everything turns by Rᵀ: it is -Rᵀ t. If that is what you wrote, has what you call R been "
+                    "overwritten by its transpose before? A slice is no copy.",
+                    id="invert-2756b6",
                 ),
                 Mistake(
                     lambda T: _with(T, t=-T[:3, 3]),
@@ -950,6 +953,11 @@ CHAPTER = Chapter(
                     lambda: 90 - np.rad2deg(frames.rotation_angle(_K0_T_K1())),
                     "This is what is missing at 90 deg. By what angle is K1 turned?",
                     id="angle-complement",
+                ),
+                Mistake(
+                    lambda: 180 - np.rad2deg(frames.rotation_angle(_K0_T_K1())),
+                    "This is 180 deg less the angle, as far above 90 deg as K1 is turned by less: a sign, or a direction, is turned around.",
+                    id="angle-turned-around",
                 ),
                 Mistake(
                     lambda: np.deg2rad(frames.rotation_angle(_K0_T_K1())),

@@ -345,7 +345,7 @@ FILES = [
                     "as `.17g` does, or `repr`.",
                     id=f"write-decimals-{decimals}",
                 )
-                for decimals in (10, 12, 16)
+                for decimals in (10, 12, 16, 17, 18, 20)
             ),
             Mistake(
                 _written(".6f"),

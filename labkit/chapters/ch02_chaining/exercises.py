@@ -88,6 +88,11 @@ def closed_loop(rng):
     return (np.concatenate([to_and_fro, [frames.invert(T) for T in to_and_fro[::-1]]]),)
 
 
+def chain(transforms):
+    """Reference of the exercise: the library's product, and I of no links at all, where a loop over them begins."""
+    return chaining.chain(transforms) if len(transforms) else np.eye(4)
+
+
 # Wrong variants --------------------------------------------------------------------------------------------------------
 
 
@@ -438,7 +443,7 @@ CHAPTER = Chapter(
         ),
         Exercise(
             "chain",
-            reference=chaining.chain,
+            reference=chain,
             draw=tuple(functools.partial(random_links, count=n) for n in (3, 2, 9, 4)),
             metric=metrics.Poses(1e-6, 1e-6),
             noisy=(
@@ -446,7 +451,7 @@ CHAPTER = Chapter(
                 metrics.Poses(1e-6, 1e-6),
                 "right, but not of a single link:",
             ),
-            properties=(right_where(chaining.chain, metrics.Poses(1e-6, 1e-6), *special.CHAINS),),
+            properties=(right_where(chain, metrics.Poses(1e-6, 1e-6), *special.CHAINS),),
             hints=(
                 "Neighboring letters cancel: T_AB T_BC T_CD = T_AD. Where does a link that has just been measured go, to the left or to the right?",
                 "Start with the identity and multiply each link from the right, in the order given: a loop over the links that keeps the product.",

@@ -828,7 +828,8 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     _covariance(lambda r, n: r @ r / n),
-                    "You divided by the number of poses: three times too large, as each pose gives three residuals.",
+                    "You divided by n, the number of poses. Each pose gives three residuals, and six unknowns are fitted to them: divide by 3n - 6.",
+                    id="pivot_covariance-e2d70b",
                 ),
                 Mistake(
                     _covariance(lambda r, n: r @ r / (3 * n)),
@@ -978,7 +979,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _weights(lambda q: np.maximum(1 - q**2, 0)),
-                    "The outer square is missing: w = (1 - q^2)^2.",
+                    "Your weights are 1 - q^2. Tukey's are the squares of these, (1 - q^2)^2, and no root is taken of them.",
+                    id="robust_weights-efee08",
                 ),
                 Mistake(
                     _weights(lambda q: np.maximum(1 - q, 0) ** 2),
