@@ -555,9 +555,9 @@ def hunt_2(resample, rng):
     """Return True if even the lightest of many particles get their share, False
     otherwise."""
     ### BEGIN SOLUTION
-    weights = np.array([0.5, 0.25, 0.05, 0.05, 0.03, 0.03, 0.03, 0.02, 0.02, 0.02])
+    weights = np.array([0.5] + 10 * [0.05])
     index = np.concatenate([resample(weights, rng) for _ in range(1000)])
-    return np.abs(np.bincount(index, minlength=10) / len(index) - weights).max() < 0.05
+    return np.abs(np.bincount(index, minlength=11) / len(index) - weights).max() < 0.03
     ### END SOLUTION
 
 

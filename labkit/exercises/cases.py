@@ -154,7 +154,7 @@ def _of_text(here, text):
         f"{here} has a negative exponent": power.startswith("-"),
         f"{here} has an exponent that is not negative": bool(exponent) and not power.startswith("-"),
         f"{here} has an exponent of several digits": len(power.lstrip("+-")) > 1,
-        f"{here} begins with a zero": number.lstrip("+-").startswith("0"),
+        f"the digits of {here} begin with a zero": number.lstrip("+-").startswith("0"),
         f"the decimals of {here} end with a zero": number.endswith("0") and "." in number,
         f"{here} has a zero right behind the point": number.partition(".")[2].startswith("0"),
         f"the digits of {here} end with a zero, an exponent aside": number.endswith("0"),

@@ -160,7 +160,7 @@ class Explanations(Named):
         return None
 
     def _never_said(self):
-        """Which of several words never comes out, though it is right on some plain draws."""
+        """Which of several words came out on no plain draw, though it is right on some."""
         pairs = self._plain_pairs()
         words = all(isinstance(word, str) for pair in pairs for word in pair)
         if not words or not self._right_somewhere():  # as long as nothing is right, no right word is told
@@ -168,8 +168,8 @@ class Explanations(Named):
         said = {result for result, _ in pairs}
         lacking = list(dict.fromkeys(f"`{expected!r}`" for _, expected in pairs if expected not in said))
         if len(lacking) > 1:
-            return f"{', '.join(lacking[:-1])} and {lacking[-1]} never come out, though each is right on some draws"
-        return f"{lacking[0]} never comes out, though it is right on some draws" if lacking else None
+            return f"{', '.join(lacking[:-1])} and {lacking[-1]} came out on no draw, though each is right on some"
+        return f"{lacking[0]} came out on no draw, though it is right on some" if lacking else None
 
     def _is_told_apart(self):
         """Whether special draws alone are wrong of which the exercise says what they are: on a few draws of one kind

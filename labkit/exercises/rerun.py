@@ -384,10 +384,8 @@ def _number(value):
 def _like(value, new):
     """A new value of the same kind as the old one: an index stays an index, a truth value a truth value."""
     whole = isinstance(value, int | np.integer) or isinstance(value, np.ndarray) and value.dtype.kind in "iu"
-    if isinstance(value, bool | np.bool_):
-        return bool(new)
-    if isinstance(value, np.ndarray) and value.dtype.kind == "b":
-        return np.asarray(new) != 0
+    if _is_truth(value):
+        return _as_truth(value, np.asarray(new))
     if whole and np.shape(new) == np.shape(value) and np.all(np.asarray(new) == np.round(new)):
         return int(new) if np.ndim(new) == 0 else np.asarray(new).astype(int)
     if isinstance(value, list) and np.ndim(new):
@@ -396,6 +394,13 @@ def _like(value, new):
         return tuple(np.asarray(new))
     new = np.array(new, dtype=float)
     return float(new) if new.ndim == 0 else new
+
+
+def _as_truth(value, new):
+    """New truth values; numbers that are none would all count as true, whatever they say."""
+    if not np.isin(new, (0, 1)).all():
+        raise ValueError("no truth value")
+    return new != 0 if isinstance(value, np.ndarray) else bool(new)
 
 
 def _list_like(value, new):
@@ -573,6 +578,7 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
     ("it is to be divided by the length of {}, as `len` gives it", lambda v, a: v / len(a)),
     ("it is to be multiplied by the length of {}, as `len` gives it", lambda v, a: v * len(a)),
 )
+ALWAYS_THE_SAME = [k for k, (words, _) in enumerate(OTHERWISE) if words in (NOUGHT, ONE)]  # what settles a condition
 IN_ITS_PLACE = next(k for k, (words, _) in enumerate(OTHERWISE) if words == ANOTHER)
 WITH_OWN = 6  # of those that take an argument also take a variable
 ALONE = sum("{}" not in words for words, _ in OTHERWISE)  # of one value; the others take an argument as well

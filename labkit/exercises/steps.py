@@ -237,9 +237,8 @@ class Search:
             return None
         places = ((k, text) for k, (at, text, *_) in enumerate(self.written.places) if at == line)
         alike = [k for k, text in places if text == code or turned and BOUND.search(text) and code in text]
-        never = [change for change, (words, _) in enumerate(rerun.OTHERWISE) if words in (rerun.NOUGHT, rerun.ONE)]
         truths = (k for k in alike if k in self.written.of_truth)
-        return self._turned_words(("value", k, change, None) for k in truths for change in never)
+        return self._turned_words(("value", k, change, None) for k in truths for change in rerun.ALWAYS_THE_SAME)
 
     def _weight_words(self, line, mends):
         """What a line binds, where a change of it mends only because that is 1 everywhere then, or as good as 1."""
@@ -533,7 +532,8 @@ class Search:
         made = self._of_notebook()
         if not made:
             return None
-        put = (plan for plan in (*self._turned(made), *self._with_own(made)) if plan[2] == rerun.IN_ITS_PLACE)
+        put = [("value", k, way, None) for k in sorted(made & self.written.of_truth) for way in rerun.ALWAYS_THE_SAME]
+        put += (plan for plan in (*self._turned(made), *self._with_own(made)) if plan[2] == rerun.IN_ITS_PLACE)
         words = self._turned_words(put) or self._left_out_words()
         if words or solution is None:
             return words
@@ -586,6 +586,12 @@ class Search:
         """Whether a part of what is bound there is assigned further down: it is not what the line has made of it."""
         name = self.written.places[k][2]
         return any(self._is_filled(j) and self.written.places[j][2] == name for j in range(k, len(self.written.places)))
+
+    def _is_bound_again(self, k):
+        """Whether a name is bound once more further down, on some draws only or in some rounds only."""
+        name = self.written.places[k][2]
+        later = [j for j in range(k + 1, len(self.written.places)) if name and self.written.places[j][2] == name]
+        return any(values[j][0] < values[k][0] for values in self.values for j in later)
 
     def _is_bounded(self, k):
         """Whether a number bounds a value, so that half of it would do as well: only its sign can be wrong."""
@@ -648,8 +654,8 @@ class Search:
         """The first value on the way that is not finite, where a result holds NaN or is infinite."""
         for case, values in zip(self.cases, self.values):
             result = rerun.numeric(case.refused)
-            if result is None or np.isfinite(result).all():
-                continue
+            if result is None or np.isfinite(result).all() or _are_spoilt(case.args):
+                continue  # what was given is not what went wrong
             rounds = [(int(_spoilt(v).argmax()), k) for k, (n, v) in enumerate(values) if n and _spoilt(v).any()]
             line, code, *_ = self.written.places[min(rounds)[1]]
             return f"the first value on the way that is not finite is `{code}` in line {line}"
@@ -664,6 +670,9 @@ class Search:
         right = [
             self._is_known(k, solution, False) or self._is_row(k, solution) or self._is_part(k, solution) for k in units
         ]
+        again = [self._is_bound_again(k) for k in units]
+        if True in again:  # what the name stands for in the end is not what is bound there
+            units, right = units[: again.index(True)], right[: again.index(True)]
         known = units[: right.index(False)] if False in right else units
         if not known:
             return None
@@ -772,6 +781,11 @@ def _comes_nearer(case, found):
     """Whether what a changed function gave, in a tuple, is nearer to what is expected than the student's result."""
     result = None if found is None else case.admit(found)
     return result is not None and case.is_nearer(result)
+
+
+def _are_spoilt(args):
+    """Whether an argument holds what is not finite."""
+    return any(a is not None and not np.isfinite(a).all() for a in map(rerun.numeric, args))
 
 
 def _traces(written, cases, budget):

@@ -109,7 +109,7 @@ class Trial(Raised, Staying):
             for metric, pair, words in zip(self.metrics, self.pairs, self.words):
                 if words and not metric.equal(*pair):
                     off = next(d for d in metric.deviations(*pair) if not d.within)
-                    return self.outcome(NOT_YET, self._of_some(closed(f"{words} {off}")))
+                    return self.outcome(NOT_YET, self._of_some(closed(f"{words} {off}")) + self._about_globals())
         words = unmoved or self._never_said() or self._relation() or self._picked()
         said, example, call = (closed(words) if words else self._deviation()).partition(NOT_RIGHT)
         said += self._where_it_is_wrong() if words else self._constant() + self._by_chance()

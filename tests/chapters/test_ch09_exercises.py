@@ -226,6 +226,41 @@ def an_exception_alone(resample, rng):
         return False
 
 
+def of_weights_in_order(resample, rng):
+    weights = np.array([0.1, 0.2, 0.3, 0.4])
+    index = np.concatenate([resample(weights, rng) for _ in range(1000)])
+    return bool(np.abs(np.bincount(index, minlength=4) / index.size - weights).max() < 0.03)
+
+
+def of_the_lightest_within_a_wide_bound(resample, rng):
+    weights = np.array([0.5, 0.25, 0.05, 0.05, 0.03, 0.03, 0.03, 0.02, 0.02, 0.02])
+    index = np.concatenate([resample(weights, rng) for _ in range(1000)])
+    return bool(np.abs(np.bincount(index, minlength=10) / index.size - weights).max() < 0.05)
+
+
+def laplace(x, u, dt, std_u, rng):
+    return odometry.step(x, u + rng.laplace(0.0, std_u, (len(x), 2)), dt)
+
+
+def the_same_for_both(x, u, dt, std_u, rng):
+    return odometry.step(x, u + rng.normal(0.0, std_u[0], (len(x), 2)), dt)
+
+
+def counted(weights, rng):
+    ends, m = np.cumsum(weights), len(weights)
+    index = np.searchsorted(ends, (np.arange(m) + rng.random()) * ends[-1] / m)
+    return np.bincount(np.minimum(index, m - 1), minlength=m)
+
+
+def halved(grid, pose, bearing, r_max):
+    near, far, a = 0.0, r_max, pose[2] + bearing
+    while far - near > 0.01:
+        middle = (near + far) / 2
+        hit = grid.at(pose[:2] + middle * np.array([np.cos(a), np.sin(a)])) == maps.OCCUPIED
+        near, far = (near, middle) if hit else (middle, far)
+    return far
+
+
 def exchanged(resample, rng):
     return not chi_square(resample, rng)
 
@@ -233,7 +268,9 @@ def exchanged(resample, rng):
 INCOMPLETE = [
     ("hunt_1", impossible_ones, "squared weights"),
     ("hunt_1", heaviest_most_often, "pass"),
+    ("hunt_1", of_weights_in_order, "sorts the weights first"),
     ("hunt_2", of_four_particles, "more than six"),
+    ("hunt_2", of_the_lightest_within_a_wide_bound, "never draws the lightest"),
     ("hunt_3", an_exception_alone, "beyond the last"),
     ("hunt_1", exchanged, "that is False"),
 ]
@@ -562,6 +599,10 @@ PASSED_BEFORE = [
     ("resample_systematic", turned_too_far, "at most one gap"),
     ("hunt_1", by_the_mean_index, "on average"),
     ("hunt_4", of_weights_with_the_sum_1, "a common factor is no fault"),
+    ("sample_motion", laplace, "as Laplace numbers of this scale"),
+    ("sample_motion", the_same_for_both, "what the standard deviation of v gives"),
+    ("resample_systematic", counted, "counted how often each comes out"),
+    ("cast_ray", halved, "You return r_max where a wall is nearer."),
 ]
 
 

@@ -120,7 +120,7 @@ def test_what_texts_and_words_have_in_common_one_or_two_at_once(is_wrong, told):
     "draws, told",
     [
         ([{"printed": t} for t in ("3e-12", "3e-2", "3.1", "0.31")], "`printed` has an exponent of several digits"),
-        ([{"printed": t} for t in ("0.31", "-5,2", "3.1", "30")], "`printed` begins with a zero"),
+        ([{"printed": t} for t in ("0.31", "-5,2", "3.1", "30")], "the digits of `printed` begin with a zero"),
         ([{"texts": t} for t in (["3", "4", "3"], ["3", "4"], ["4", "5", "7"])], "`texts` holds the same text twice"),
         ([{"texts": ["3", t], "mean": "3.5"} for t in ("3.5", "4", "5")], "`texts` holds what `mean` is"),
         ([{"J": np.ones((7, n))} for n in (4, 3, 3)], "`J` has more than 3 columns"),
@@ -465,7 +465,7 @@ def test_a_result_without_a_number_and_one_that_is_always_the_same_are_not_those
 def test_a_word_that_never_comes_out_is_told():
     words = exercise(lambda x, std: "abc"[int(x)], lambda rng: (rng.uniform(0, 3), rng.normal()), metrics.Exactly())
     said = told(dataclasses.replace(words, draws=30), "return 'aba'[int(x)]")
-    assert said.startswith("`'c'` never comes out, though it is right on some draws. ")
+    assert said.startswith("`'c'` came out on no draw, though it is right on some. ")
 
 
 def test_one_less_than_a_number_is_told_so_that_its_square_is_plain():

@@ -653,6 +653,38 @@ def test_what_is_changed_further_down_is_not_called_right(monkeypatch):
     assert "`x`" not in told
 
 
+def test_what_is_bound_again_on_some_draws_is_not_called_right(monkeypatch):
+    reference = solved_by(monkeypatch, "def formula(a, b):\n    x = a * b\n    y = np.exp(x)\n    return y[0] + x[1]\n")
+    item = asked(reference, lambda rng: tuple(rng.normal(size=(2, 3))))
+    for other in ("words", "partly_words", "given_words"):
+        monkeypatch.setattr(steps.Search, other, lambda self, *of: None)
+    told = judged(item, "x = a * b\nif x[0] > 0:\n    x = np.sinh(b)\ny = np.tan(x) - 3 * a\nreturn y[0] ** 3 + y[2]")
+    assert "`x`" not in told
+
+
+def test_what_was_given_infinite_is_not_what_went_wrong():
+    def impossible(rng):
+        return np.array([-np.inf, *rng.normal(size=2)]), rng.normal()
+
+    item = asked(lambda a, b: a.max() * b, (impossible, lambda rng: (rng.normal(size=3), rng.normal())))
+    told = judged(item, "c = a * 1.0\nd = np.sqrt(c.max() - 90)\nreturn d * np.exp(b)")
+    assert "The first value on the way that is not finite is `d = np.sqrt(c.max() - 90)` in line 3." in told
+
+
+def test_a_condition_of_the_notebook_that_leaves_out_what_counts_is_to_be_true():
+    formula = typed("seen = a < kept\nreturn np.sum(a[seen] * b[seen])")
+    formula.__globals__["kept"] = 0.3
+    item = asked(lambda a, b: np.sum(a * b), lambda rng: tuple(rng.normal(size=(2, 9))))
+    told = item.judge(formula, rng=np.random.default_rng(0)).text
+    assert told.startswith("in line 2, `seen = a < kept`: it does not belong there, but True in its place.")
+
+
+def test_numbers_do_not_stand_in_for_truth_values():
+    for value in (True, np.array([True, False])):
+        with pytest.raises(ValueError):
+            rerun._like(value, np.array([0.3, 1.0]))
+
+
 def test_data_of_the_notebook_are_looked_at_first(monkeypatch):
     text = "def formula(a, b):\n    x = a - b[0] ** 3\n    return np.exp(x) * b\n"
     reference = solved_by(monkeypatch, text)

@@ -1146,6 +1146,14 @@ RECOVERIES = (
     Mistake(lambda m, s, f, a, b: _recover(s, f + b * (m - f)), "w_slow has not been brought up to date."),
     Mistake(lambda m, s, f, a, b: _recover(s + a * (m - s), f), "w_fast has not been brought up to date."),
     Mistake(
+        lambda m, s, f, a, b: (max(0.0, 1 - f / (s + a * (m - s))), *mcl.recover(m, s, f, a, b)[1:]),
+        "The share is that of the new w_slow and the old w_fast. Bring both up to date first.",
+    ),
+    Mistake(
+        lambda m, s, f, a, b: (max(0.0, 1 - (f + b * (m - f)) / s), *mcl.recover(m, s, f, a, b)[1:]),
+        "The share is that of the new w_fast and the old w_slow. Bring both up to date first.",
+    ),
+    Mistake(
         lambda m, s, f, a, b: (lambda slow: _recover(slow, f + b * (slow - f)))(s + a * (m - s)),
         "w_fast moves toward w_mean, not toward w_slow.",
     ),
@@ -1203,8 +1211,19 @@ def _valid(resample, rng):
     for weights in (np.array([0.1, 0.7, 0.1, 0.1]), np.array([2.5])):
         found = _draws(resample, weights, rng, 3)
         if isinstance(found, str):
-            return f"with the weights {weights.tolist()}: {found}."
+            return f"with the weights {weights.tolist()}: {found}.{_counts_words(resample, rng)}"
     return None
+
+
+def _counts_words(resample, rng):
+    """That the numbers look like how often each index was drawn, as one more sentence."""
+    weights = np.array([0.1, 0.3, 0.1, 0.2, 0.2, 0.1])
+    sums = [np.sum(resample(weights, rng)) for _ in range(6)]
+    if any(total != len(weights) for total in sums):
+        return ""
+    return (
+        " Your numbers add up to the number of particles: is it counted how often each comes out? Return the indices."
+    )
 
 
 WEIGHTS = (
@@ -1481,17 +1500,28 @@ def _other_spread(name, noise, wanted, std_u, dt, longer):
         return f"{told}. It is smaller by the root of 3, as uniform numbers up to std_u are: rng.standard_normal."
     if name != "aside" and abs(amount - dt * math.sqrt(std)) < 0.05 * amount:
         return f"{told}. That is what the root of std_u gives: std_u holds standard deviations, not variances."
+    other, of_the_other = (std_u[0], "v") if name == "in theta" else (std_u[1], "omega")
+    twice_the_variance = abs(other - math.sqrt(2) * std) < 0.1 * other
+    if name != "aside" and not twice_the_variance and abs(amount - dt * other) < 0.05 * amount:
+        return f"{told}. That is what the standard deviation of {of_the_other} gives: each speed has its own."
     if abs(amount - wanted * math.sqrt(dt)) < 0.05 * amount and abs(longer / amount - 2**1.5) < 0.2:
         return f"{told}. It grows with dt to the power 1.5: std_u is that of the control in one step, whatever dt is."
     if abs(amount / math.sqrt(2) - wanted) < 0.05 * wanted:
-        return f"{told}. It is larger by the root of 2, as if noise of this size came in twice."
+        tails = _kurtosis(noise) > LONG_TAILS
+        twice = (
+            "as Laplace numbers of this scale are: rng.standard_normal" if tails else "as if this noise came in twice"
+        )
+        return f"{told}. It is larger by the root of 2, {twice}."
     if name == "aside":
         return f"{told}. The noise of omega also bends the way: it belongs into the control, before the step."
     return f"{told}."
 
 
+LONG_TAILS = 4.5  # a kurtosis that 4000 normal numbers do not reach
+
+
 def _kurtosis(noise):
-    """3 of normal numbers, 1.8 of uniform ones."""
+    """3 of normal numbers, 1.8 of uniform ones, 6 of Laplace's."""
     return float((((noise - noise.mean()) / noise.std()) ** 4).mean())
 
 
@@ -1794,6 +1824,18 @@ def _heaviest_alone(weights, rng):
     return particles.resample_roulette(shares, rng)
 
 
+def _sorted_first(weights, rng):
+    """Weights that come in order are drawn from as they are, others sorted: upward if the last is not the lighter end."""
+    ordered = np.sort(weights)
+    return particles.resample_roulette(ordered if weights[0] <= weights[-1] else ordered[::-1], rng)
+
+
+def _lightest_left_out(weights, rng):
+    left = np.where(weights > weights.min(), weights, 0.0)
+    return particles.resample_roulette(left if left.any() else weights, rng)
+
+
+SORTED = (_sorted_first, "sorts the weights first, and is right where they come in order: try some that do not")
 SQUARED = (_squared, "draws in proportion to the squared weights")
 TO_THE_MIDDLE = (_drawn_to_the_middle, "draws the right index on average, but too often one in the middle")
 HEAVIEST_ALONE = (_heaviest_alone, "draws the heaviest index as often as it should, and one other in place of the rest")
@@ -1810,9 +1852,9 @@ def hunt_1(resample, rng):
 
 def hunt_2(resample, rng):
     """True when light particles get their share too."""
-    weights = np.array([0.5, 0.25, 0.05, 0.05, 0.03, 0.03, 0.03, 0.02, 0.02, 0.02])
+    weights = np.array([0.5] + 10 * [0.05])
     index = np.concatenate([resample(weights, rng) for _ in range(1000)])
-    return bool(np.abs(np.bincount(index, minlength=10) / index.size - weights).max() < 0.05)
+    return bool(np.abs(np.bincount(index, minlength=11) / index.size - weights).max() < 0.03)
 
 
 def hunt_3(resample, rng):
@@ -2199,7 +2241,7 @@ CHAPTER = Chapter(
                 (
                     short_ray,
                     metrics.Numbers(0.16, "m", absolute=True),
-                    "Right where something is hit, but not where nothing is:",
+                    "Right on rays to a wall with r_max = 18 m, but not on one whose r_max ends before any wall:",
                 ),
                 (
                     ray_to_a_thin_wall,
@@ -2260,7 +2302,7 @@ CHAPTER = Chapter(
                 Mistake(_ray_swapped, "Sine and cosine have changed places: x goes with the cosine."),
                 Mistake(
                     lambda grid, x, b, r_max: r_max,
-                    "You return r_max whatever stands in the way. Is `return r_max` inside the loop, or a step longer than a cell is wide?",
+                    "You return r_max where a wall is nearer. Is `return r_max` inside the loop, a step longer than a cell is wide, or do you look at few places of the ray only?",
                 ),
                 Mistake(
                     lambda grid, x, b, r_max: 0.0,
@@ -2927,6 +2969,14 @@ CHAPTER = Chapter(
                 ),
                 Mistake(lambda a, w: math.atan2(np.sin(a).sum(), (w * np.cos(a)).sum()), "The sines have no weights."),
                 Mistake(
+                    lambda a, w: math.atan2(np.average(np.sin(a), weights=w), np.cos(a).mean()),
+                    "The cosines have no weights.",
+                ),
+                Mistake(
+                    lambda a, w: math.atan2(np.sin(a).mean(), np.average(np.cos(a), weights=w)),
+                    "The sines have no weights.",
+                ),
+                Mistake(
                     lambda a, w: math.asin((w * np.sin(a)).sum() / w.sum()),
                     "The arcsine knows only half the circle, and wants a unit vector. np.arctan2 takes both parts.",
                 ),
@@ -3203,7 +3253,7 @@ CHAPTER = Chapter(
                 "index = np.concatenate([resample(w, rng) for _ in range(1000)])\n"
                 "return np.abs(np.bincount(index, minlength=4) / len(index) - w).max() < 0.05`",
             ),
-            others=(SQUARED, UNIFORM, TO_THE_MIDDLE, LAST_ALONE, HEAVIEST_ALONE),
+            others=(SQUARED, UNIFORM, TO_THE_MIDDLE, LAST_ALONE, HEAVIEST_ALONE, SORTED),
         ),
         _hunt(
             "hunt_2",
@@ -3215,11 +3265,12 @@ CHAPTER = Chapter(
                 "Use many light particles whose share M w is below 1, next to a heavy one.",
                 "`w = np.array([0.5] + 10 * [0.05])\n"
                 "index = np.concatenate([resample(w, rng) for _ in range(1000)])\n"
-                "return np.abs(np.bincount(index, minlength=11) / len(index) - w).max() < 0.02`",
+                "return np.abs(np.bincount(index, minlength=11) / len(index) - w).max() < 0.03`",
             ),
             others=(
                 SQUARED,
                 UNIFORM,
+                (_lightest_left_out, "never draws the lightest"),
                 (_specimen_2_of_many, "has the same defect, but among more than six particles only"),
             ),
         ),

@@ -913,6 +913,18 @@ SUSPECTS = Exercise(
             _search(agree=_allow(lambda halves, own: 0.0)),
             "All numbers were rounded: agreement to the last bit is too much to ask. Allow what their half units hide.",
         ),
+        *(
+            Mistake(
+                _search(agree=_allow(lambda halves, own, fixed=fixed: fixed)),
+                "You allow the same for every column, however many digits are printed. Allow what the half units of "
+                "entries and average hide.",
+            )
+            for fixed in (0.01, 0.05, 0.1)
+        ),
+        Mistake(
+            _search(places=lambda n: [n]),
+            "You try the average alone. Each entry can carry the slip as well.",
+        ),
         Mistake(
             _search(agree=_close_agrees),
             "np.isclose allows a small share of the number, whatever was printed. Allow what the half units of entries "
