@@ -40,6 +40,7 @@ def changes(names, inputs, notebook):
         if all(np.shape(a) == np.shape(b) for a, b in zip(columns[i], columns[j])):
             yield f"with `{names[i]}` and `{names[j]}` exchanged", _exchange(i, j)
     yield from _fewer_rows(names, columns, numeric)
+    yield from _of_lower_size(names, columns, numeric)
     for k in numeric:
         for words, change in _of_one(names[k], columns[k]):
             yield words, _replace(k, change)
@@ -102,6 +103,31 @@ def _fewer_rows(names, columns, numeric):
             *((f"with the first {n} of {of} alone", np.s_[:n]) for n in (2, 3, 4)),
         ):
             yield words, _rows(group, rows)
+
+
+def _of_lower_size(names, columns, numeric):
+    """The first ones of a vector, with the rows and columns of matrices that go with them: code for one size alone."""
+    axes = {}
+    for k in numeric:
+        for axis in range(np.ndim(columns[k][0])) if len({np.ndim(v) for v in columns[k]}) == 1 else ():
+            axes.setdefault(tuple(np.shape(v)[axis] for v in columns[k]), []).append((k, axis))
+    for sizes, found in axes.items():
+        vectors = [k for k, _ in found if np.ndim(columns[k][0]) == 1]
+        others = list(dict.fromkeys(k for k, _ in found if k not in vectors))
+        if vectors and others and len(set(sizes)) > 1:
+            of, beside = (" and ".join(f"`{names[k]}`" for k in group) for group in (vectors, others))
+            for n, first in ((1, "the first"), (2, "the first 2")):
+                yield f"with {first} of {of} alone, and what goes with it in {beside}", _up_to(n, found)
+
+
+def _up_to(n, axes):
+    def change(args):
+        args = list(args)
+        for k, axis in axes:
+            args[k] = np.take(args[k], range(min(n, np.shape(args[k])[axis])), axis)
+        return tuple(args)
+
+    return change
 
 
 def _is_single(column):

@@ -33,6 +33,14 @@ BETWEEN = exercise(
     lambda A, B: frames.invert(A) @ B, lambda rng: (random_pose(rng), random_pose(rng)), metrics.Poses(1e-6, 1e-6)
 )
 
+SIZED = exercise(
+    lambda B, u, V: (B @ u + np.diag(B @ V @ B.T)) ** 3,
+    tuple(
+        lambda rng, k=k: (rng.normal(size=(3, k)), rng.uniform(1, 2, k), np.eye(k) + rng.uniform(0, 0.2, (k, k)))
+        for k in (1, 3, 2)
+    ),
+)
+
 
 @pytest.mark.parametrize(
     "of, change, told",
@@ -56,6 +64,12 @@ BETWEEN = exercise(
         (ROWS, lambda a, b, n: (a[1:], b[1:], n), "comes out without the first of `a` and `b`"),
         (ROWS, lambda a, b, n: (a[::-1], b[::-1], n), "comes out with `a` and `b` in reverse order"),
         (ROWS, lambda a, b, n: (a[:4], b[:4], n), "comes out with the first 4 of `a` and `b` alone"),
+        (
+            SIZED,
+            lambda B, u, V: (B[:, :1], u[:1], V[:1, :1]),
+            "the first of `u` alone, and what goes with it in `B` and `V`",
+        ),
+        (SIZED, lambda B, u, V: (B[:, :2], u[:2], V[:2, :2]), "with the first 2 of `u` alone, and what goes with it"),
         (BETWEEN, lambda A, B: (A, frames.pose(B[:3, :3].T, B[:3, 3])), "with the rotation of `B` transposed"),
     ],
 )
