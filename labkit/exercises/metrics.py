@@ -22,6 +22,14 @@ class Refused(Exception):
     """The result cannot be compared at all; the message says what was expected and what came."""
 
 
+class RefusedBeside(Refused):
+    """The first of several results is right, one behind it is not: `lead` says so, `pair` is (that one, expected)."""
+
+    def __init__(self, name, metric, pair, deviation):
+        self.lead, self.metric, self.pair = f"the first result is right, the {name} is not", metric, pair
+        super().__init__(f"{self.lead}: {deviation}")
+
+
 @dataclass(frozen=True)
 class Deviation:
     """How far one aspect of a result is off."""
@@ -452,9 +460,10 @@ class First(Metric):
         first = self.metric.admit(result[0], expected)
         for (name, metric, reference), part in zip(self.others, result[1:]):
             wanted = reference()
-            off = [d for d in metric.deviations(metric.admit(part, wanted), wanted) if not d.within]
+            part = metric.admit(part, wanted)
+            off = [d for d in metric.deviations(part, wanted) if not d.within]
             if off and self.metric.equal(first, expected):
-                raise Refused(f"the first result is right, the {name} is not: {off[0]}")
+                raise RefusedBeside(name, metric, (part, wanted), off[0])
         return first
 
     def deviations(self, result, expected):

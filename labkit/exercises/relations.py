@@ -40,6 +40,13 @@ def difference_words(metric, pairs, sizes=(), whole=False):
     return None
 
 
+def of_a_part(words):
+    """What is said of a result, said of a value on the way or of one of several results."""
+    for said, told in (("your result", "it"), ("your matrix", "it"), ("the expected", "the right")):
+        words = words.replace(said, told)
+    return words
+
+
 def _relation(metric, results, expected, sizes, whole):
     if isinstance(metric, Exactly | Several):
         return None

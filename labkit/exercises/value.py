@@ -67,7 +67,7 @@ class Value(Item):
             else guard.run(lambda: self._converted(answer, unit, expected), ())
         )
         if isinstance(run.error, metrics.Refused | ValueError):
-            return Outcome(NOT_YET, closed(_for_value(run.error)) + _of_shape(answer, expected))
+            return Outcome(NOT_YET, _refusal_words(run.error, answer, expected))
         if run.error is not None:
             return Outcome(NOT_YET, f"expected a number{self._in_unit()}, got {metrics._describe(answer)}.")
         return self._compare(metric, run.result, expected)
@@ -92,13 +92,11 @@ class Value(Item):
 
     def _judge_with(self, metric, expected, answer):
         run = guard.run(lambda: metric.admit(answer, expected), ())
+        if isinstance(run.error, metrics.Refused):
+            return Outcome(NOT_YET, _refusal_words(run.error, answer, expected))
         if run.error is not None:
-            text = (
-                _for_value(run.error)
-                if isinstance(run.error, metrics.Refused)
-                else f"{type(run.error).__name__}: {run.said}"
-            )
-            return Outcome(NOT_YET, closed(text) + _of_shape(answer, expected))
+            text = closed(f"{type(run.error).__name__}: {run.said}")
+            return Outcome(NOT_YET, text + _of_shape(answer, expected))
         return self._compare(metric, run.result, expected)
 
     def _compare(self, metric, answer, expected):
@@ -169,6 +167,14 @@ def _right_entries(answer, expected):
     if not told or right.all():
         return ""
     return f", though {', '.join(map(str, told))} (counted from 0) {'are' if len(told) > 1 else 'is'} right"
+
+
+def _refusal_words(refusal, answer, expected):
+    """Why an answer cannot be compared; of a result behind the first, what it has to do with the right one."""
+    if not isinstance(refusal, metrics.RefusedBeside):
+        return closed(_for_value(refusal)) + _of_shape(answer, expected)
+    words = relations.difference_words(refusal.metric, [refusal.pair], (), True)
+    return closed(f"{refusal.lead}: {relations.of_a_part(words)}" if words else str(refusal))
 
 
 def _of_shape(answer, expected):

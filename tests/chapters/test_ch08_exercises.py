@@ -111,14 +111,16 @@ def test_the_printed_example_takes_the_state_or_both_results():
     x, cov = ch08._printed_correction().x, ch08._printed_correction().cov
     item = ITEMS["corrected"]
     assert item.judge(x).status == item.judge((x, cov)).status == CORRECT
-    assert "covariance is not" in item.judge((x, 2 * cov)).text
+    assert "covariance is not: it is twice the right one." in item.judge((x, 2 * cov)).text
+    assert "covariance is not: the largest entry is off by" in item.judge((x, cov + 1)).text
     assert item.judge((np.array([12.5, 5.0]), cov)).text == item.judge(np.array([12.5, 5.0])).text
 
 
 def test_the_fused_position_may_come_with_its_variance_and_in_another_unit():
     item, x = ITEMS["fused"], ch08._fusion()
     assert item.judge(x).status == item.judge((x, 1 / 5.05)).status == item.judge(100 * x, "cm").status == CORRECT
-    assert "the variance is not" in item.judge((x, 0.3)).text
+    assert item.judge((x, 0.3)).text == "the first result is right, the variance is not: it is off by 0.102."
+    assert "the variance is not: it is the square root of the right one." in item.judge((x, 5.05**-0.5)).text
     assert item.judge((ch08._fusion(x0=20.0), 1 / 5.05)).text == "20 is the prior's variance. Its position is 0."
 
 
