@@ -105,5 +105,5 @@ class Raised(Explanations):
             return outcome
         drawn = [own_steps.Case(args, metric, expected), *self._fresh[:2]]
         search = own_steps.search(self.function, self._names(args), drawn, self._judging(), self.budget)
-        words = search and search.words()
+        words = search and (search.finer_words() or search.words())
         return replace(outcome, text=f"{outcome.text}\n{words[0].upper()}{closed(words[1:])}") if words else outcome

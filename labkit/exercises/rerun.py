@@ -201,9 +201,9 @@ class Written:
 
         A plan is ("code", number of a change), ("value", number of a place, number of one of `OTHERWISE`, number of an
         argument), ("own", number of a place, number of one of `OTHERWISE`, number of the place where a variable was
-        bound before), ("argument", number of an argument, number of one of `OTHERWISE`) or ("given", number of a place,
-        values in its place, one for every round). Where one fails, `keep` gets None. The list is shorter where the
-        time, in seconds, is over.
+        bound before), ("argument", number of an argument, number of one of `OTHERWISE`), ("given", number of a place,
+        values in its place, one for every round) or ("last", number of a place), which gives the last of its values.
+        Where one fails, `keep` gets None. The list is shorter where the time, in seconds, is over.
         """
         found = []
 
@@ -224,6 +224,11 @@ class Written:
                 if plan[0] == "argument":
                     note = _Note(self.counted)
                     return (self._made(self._noted, {NOTE: note})(*_given_otherwise(copies, *plan[1:])),)
+                if plan[0] == "last":
+                    note = _Note(self.counted)
+                    note.watched = plan[1]
+                    self._made(self._noted, {NOTE: note})(*copies)
+                    return (note.seen,)
                 note = _Note(self.counted, plan[1])
                 note.watched = plan[3] if plan[0] == "own" else None
                 note.otherwise = _otherwise(plan, copies, note)

@@ -46,6 +46,7 @@ TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
 TURNED = "has the wrong sign"
 UNEQUAL = ("where `==` belongs", "where `!=` belongs")  # what computed numbers are never, or always
 TRUTHS = {"`0` belongs": "`False` belongs", "`1` belongs": "`True` belongs"}
+NOT_NEEDED = "What you make of it there does not belong in the result"
 ALONE = "With this alone changed, your result is right"
 
 
@@ -170,9 +171,16 @@ class Search:
         self.turns = any(map(ANGLES.search, [written.function.__doc__ or "", *written.lines.values()]))
 
     @_or_nothing
+    def finer_words(self):
+        """That a bound or a step is too coarse, or that a loop has too few rounds: before the solution is looked at,
+        which may well take all the time where an iteration is asked for.
+        """
+        return self.code_words((mutation.FINER,))
+
+    @_or_nothing
     def words(self):
         """What is wrong where, from the likeliest kind of change to the least; None where nothing mends the result."""
-        words = self.code_words((mutation.FINER,)) or self.code_words(range(WORTH))
+        words = self.code_words(range(WORTH))
         return words or self.value_words() or self.code_words(range(WORTH, 9))
 
     def mending(self, plans, values=None):
@@ -322,6 +330,10 @@ class Search:
         if plan is None:
             return None
         kind, k, change, other = plan
+        if rerun.OTHERWISE[change][0] == rerun.NOUGHT and self._is_given(k):
+            nought = "zeros" if any(values[k][1].ndim > 1 for values in self.values) else "0"
+            there = "on the right side" if self._binds(k) else "in its place"
+            return f"{self._where(k)}: with {nought} {there}, your result is right. {NOT_NEEDED}"
         name = "" if other is None else self._bound(other) if kind == "own" else f"`{self.names[other]}`"
         words = rerun.OTHERWISE[change][0].format(name)
         words = rerun.OF_TRUTHS.get(words, words) if k in self.written.of_truth else words
@@ -645,9 +657,14 @@ class Search:
                 mine, theirs = (
                     any(values[i][0] > 1 for values in v) for i, v in ((k, self.values), (q, solution.values))
                 )
-                each = (", in the last round" if theirs else ", a part of it in each round") if mine else ""
+                each = (self._in_which_round(k) if theirs else ", a part of it in each round") if mine else ""
                 return f"{self._where(k)}, stands the right result{each}, but something else is returned"
         return None
+
+    def _in_which_round(self, k):
+        """In which round a value is the right result: it need not be the last, of which there may be more than kept."""
+        last = (self._fitting([("last", k)], i, self.budget, None) for i in range(len(self.cases)))
+        return ", in the last round" if all(fit == [True] for fit in last) else ", in some round"
 
     @_or_nothing
     def not_finite_words(self):
@@ -921,9 +938,7 @@ def value_relation(mine, theirs, named):
     if words and rounds:
         words = (ONE_ENTRY if rounds == 1 else ONE_ROW).sub("round", words)
         words = words.replace("the first round is right, not all behind it are", FIRST_ROUND)
-    for said, told in (("your result", "it"), ("your matrix", "it"), ("the expected", "the right")):
-        words = words and words.replace(said, told)
-    return words
+    return words and relations.of_a_part(words)
 
 
 class Solution:

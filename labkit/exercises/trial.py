@@ -90,8 +90,9 @@ class Trial(Raised, Staying):
         words = kept or self._kept() or self._relation(whole=True) or self._other_arguments() or self._terms()
         unmoved = None if words or self.refusal else self._unmoved()  # now, since the search may use up the budget
         search = None if words else self._search()
-        solution = search and self._solution(search)
-        step = search and (search.passed_words(solution) or search.notebook_words(solution) or search.words())
+        step = search and search.finer_words()
+        solution = search and not step and self._solution(search)
+        step = step or search and (search.passed_words(solution) or search.notebook_words(solution) or search.words())
         shape = self._other_shape() if self.refusal else ""
         words = words or (not self.refusal and step) or (not shape and (unmoved or self._one_change()))
         if words:

@@ -973,6 +973,47 @@ def test_what_is_right_after_the_last_round_is_no_part_of_the_result_in_each():
     assert "stands the right result, in the last round" in text
 
 
+ROOT = """
+x = b
+for _ in range(15):
+    x = (x + a / x) / 2
+return x
+"""
+
+
+def both_positive(rng):
+    return tuple(rng.uniform(1, 4, 2))
+
+
+def test_the_right_result_of_an_earlier_round_is_not_called_that_of_the_last(monkeypatch):
+    item = asked(solved_by(monkeypatch, f"def formula(a, b):{textwrap.indent(ROOT, '    ')}"), both_positive)
+    twice = """
+    for x in (b, -b):
+        for _ in range(20):
+            x = (x + a / x) / 2
+    return np.cos(x) - 3 * x
+    """
+    assert "stands the right result, in some round, but something else" in judged(item, twice)
+
+
+def test_what_is_too_coarse_is_told_before_the_solution_is_looked_at(monkeypatch):
+    reference, looked_at = solved_by(monkeypatch, f"def formula(a, b):{textwrap.indent(ROOT, '    ')}"), []
+    monkeypatch.setattr(steps.slips, "solved", looked_at.append)
+    coarse = """
+    x = b
+    while abs(x * x - a) > 0.001:
+        x = (x + a / x) / 2
+    return x
+    """
+    assert "`0.001` is far too large" in judged(asked(reference, both_positive), coarse) and not looked_at
+
+
+def test_an_argument_on_which_nothing_depends_is_told_as_such():
+    item = asked(lambda a, b: np.array([a, 2 * a]), both_positive)
+    body = "c = b\nreturn np.array([a * np.cosh(c), 2 * a * np.cos(c)])"
+    assert "`c = b`: with 0 on the right side, your result is right. What you make of it there" in judged(item, body)
+
+
 def test_what_stands_within_bounds_has_not_changed_places_with_another():
     function = ast.parse("def answer(d, s, factor):\n    return d / max(s, 1e-3) <= factor").body[0]
     exchanged = [change.mends for change in mutation.mending(function) if "changed places" in change.mends]
