@@ -2006,7 +2006,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _offset(lambda d, turn, way: way / turn * (1 - np.cos(turn))),
-                    "You let the middle of the robot go the way that was counted. One wheel goes farther: way (1 + excess / 2).",
+                    "Here the middle of the robot goes the way that was counted. That is the way of its left wheel: the middle goes "
+                    "way (1 + excess / 2), on a circle half a track beside it.",
                 ),
                 Mistake(
                     _offset(lambda d, turn, way: d / turn * (1 - np.cos(way * turn / d))),
