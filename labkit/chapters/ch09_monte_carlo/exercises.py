@@ -1029,10 +1029,15 @@ RESAMPLING_SLIPS = (
         _up_to_the_share,
         "Right but for an effective size that is just the share: below it means `<`, not `<=`.",
     ),
-    (lambda w, t: True, "You resample always. With even weights that only loses particles."),
+    (
+        lambda w, t: True,
+        "You resample on every draw of this check. With even weights that only loses particles.",
+        "should_resample-005c5c",
+    ),
     (
         lambda w, t: False,
-        "You never resample. Do you compare with a bare share? The effective size counts particles: threshold * len(weights).",
+        "You resample on no draw of this check. Do you compare with a bare share? The effective size counts particles: threshold * len(weights).",
+        "should_resample-15c3c9",
     ),
 )
 
@@ -2303,6 +2308,7 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda grid, x, b, r_max: r_max,
                     "You return r_max where a wall is nearer. Is `return r_max` inside the loop, a step longer than a cell is wide, or do you look at few places of the ray only?",
+                    id="cast_ray-839415",
                 ),
                 Mistake(
                     lambda grid, x, b, r_max: 0.0,
@@ -2743,7 +2749,7 @@ CHAPTER = Chapter(
             draw=(
                 *(
                     functools.partial(cloud_and_threshold, slip=slip)
-                    for slip, _ in RESAMPLING_SLIPS
+                    for slip, *_ in RESAMPLING_SLIPS
                     if slip is not _up_to_the_share
                 ),
                 *(functools.partial(near_the_threshold, side=side) for side in (1, -1)),
@@ -2763,7 +2769,7 @@ CHAPTER = Chapter(
                 "`return effective_size(weights) < threshold * len(weights)`",
             ),
             mistakes=[
-                *(Mistake(slip, text) for slip, text in RESAMPLING_SLIPS),
+                *(Mistake(slip, text, *id) for slip, text, *id in RESAMPLING_SLIPS),
                 *(
                     Mistake(
                         lambda w, t, whole=whole: whole(particles.effective_size(w)) < t * len(w),
@@ -2857,7 +2863,11 @@ CHAPTER = Chapter(
                     "The weights are right. Resample in every n-th step, not in all others.",
                 ),
                 Mistake(_cycle(due=lambda k, n: True), "The weights are right. You resample in every step."),
-                Mistake(_cycle(due=lambda k, n: False), "The weights are right. You never resample."),
+                Mistake(
+                    _cycle(due=lambda k, n: False),
+                    "The weights are right. You resample in no step that was asked for, and some are an n-th one.",
+                    id="multiply_weights-e12379",
+                ),
                 Mistake(
                     _cycle(due=lambda k, n: k >= n), "The weights are right. From step n on you resample in every step."
                 ),
