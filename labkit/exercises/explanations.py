@@ -15,6 +15,7 @@ from .results import Refusal, are_one, could_change, equal_as_written, is_row, n
 from .wording import closed, in_ordinary_cases, leading, shown_whole
 
 NOT_RIGHT = "\nNot right when called as "
+MORE_ACCURATE = ": is a case special there, or is it nearly right everywhere, and accurate enough there alone?"
 MANY_DIGITS = 1e-3  # by how much better some draws come out where one case is special
 TELLING = 6  # draws on which a choice is wrong as by an explanation, so that this is not chance
 LIKE_CHANCE = 8  # draws on which a choice must stay as it is, so that this is not chance
@@ -276,7 +277,7 @@ class Explanations(Named):
             told = f"{told[:-1]}, and {side}." if side else told
             return told + self._right_parts() + example
         special = self._special_case()
-        asked = ", perhaps by chance." if self._is_choice() else ": which case is special?"
+        asked = ", perhaps by chance." if self._is_choice() else MORE_ACCURATE if near else ": which case is special?"
         right = special or f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws{asked}"
         return f"{told} {right}{example}"
 

@@ -256,7 +256,8 @@ def _everywhere(found):
     """One change made at all places at once that look alike but for their names, or lose the same function."""
     alike = {}
     for change in found:
-        if change.rank <= REPEATED and change.mends and isinstance(change.place, ast.expr):
+        likely = change.rank <= REPEATED or isinstance(change.place, ast.Attribute)  # `wells.value` for `f`, each time
+        if likely and change.mends and isinstance(change.place, ast.expr):
             alike.setdefault((change.words, _form(change.place), _form(_put(change))), []).append(change)
             if isinstance(change.place, ast.Call) and re.fullmatch(r"without `\w+`", change.words):
                 alike.setdefault((change.words, ast.unparse(change.place.func), ""), []).append(change)

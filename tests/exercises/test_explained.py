@@ -254,6 +254,15 @@ def test_the_special_case_is_named():
     )
 
 
+def test_where_some_draws_are_accurate_enough_it_is_asked_for_accuracy_beside_the_case():
+    steps = tuple(lambda rng, step=step: (float(rng.uniform(1, 2)), step) for step in (1e-3, 1e-5))
+    item = Exercise(
+        "slope", reference=lambda x, step: 5 * x**4, draw=steps, metric=metrics.Numbers(1e-7), hints=("a", "b", "c")
+    )
+    told = item.judge(lambda x, step: ((x + step) ** 5 - (x - step) ** 5) / (2 * step), np.random.default_rng(0)).text
+    assert "accurate enough there alone?" in told
+
+
 def test_the_special_case_is_named_behind_the_entry_that_is_wrong():
     item = exercise(
         lambda x, std: np.array([x, x * std, 3.0]), lambda rng: (rng.uniform(1, 2), float(rng.choice([-1.3, 1.7])))

@@ -198,6 +198,15 @@ def test_data_of_the_notebook_are_told_where_an_argument_belongs():
     assert "in line 3, `box.kept`: `box.kept` stands where `a` belongs." in outcome.text
 
 
+def test_what_the_notebook_holds_is_told_wherever_it_stands_for_an_argument():
+    formula = typed("return np.sin(box.kept) * b + np.cos(a) * box.kept ** 2")
+    formula.__globals__["box"] = ModuleType("box")
+    formula.__globals__["box"].kept = np.array([0.6, 0.8, 0.0])
+    item = replace(ITEM, reference=lambda a, b: np.sin(a) * b + np.cos(a) * a**2)
+    outcome = item.judge(formula, rng=np.random.default_rng(0))
+    assert "`box.kept` stands where `a` belongs, and the same in `box.kept` (line 2)" in outcome.text
+
+
 @pytest.mark.parametrize(
     "right, body, said",
     [

@@ -844,10 +844,16 @@ CHAPTER = Chapter(
                     "f(x + h e) − f(x − h e).",
                     id="measured-nought",
                 ),
-                Mistake(
-                    beyond.not_put_back,
-                    "Only the first component is right: put each unknown back before you move the next one.",
-                    id="measured-not-restored",
+                *(
+                    Mistake(
+                        variant,
+                        "Only the first component is right: put each unknown back before you move the next one.",
+                        id=id,
+                    )
+                    for variant, id in (
+                        (beyond.not_put_back, "measured-not-restored"),
+                        (beyond.neither_put_back, "measured-neither-restored"),
+                    )
                 ),
             ],
         ),
@@ -1336,6 +1342,11 @@ CHAPTER = Chapter(
                     beyond.chords(lambda t, v, c: (v - v[0]).max()),
                     "You compare with f(x) alone. The chord goes on to f(y): (1 − t) f(x) + t f(y).",
                     id="chord-first-end",
+                ),
+                Mistake(
+                    beyond.chords(lambda t, v, c: (v - (v[0] + v[-1]) / 2).max()),
+                    "You compare with the mean of both ends, which is the chord's height in its middle alone: (1 − t) f(x) + t f(y).",
+                    id="chord-mean-of-ends",
                 ),
                 Mistake(
                     beyond.chords(lambda t, v, c: v.max()),
@@ -2096,6 +2107,11 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: 100 * wells.luck(), "Right, in percent: give the probability as a number between 0 and 1."
+                ),
+                Mistake(
+                    lambda: 1 - 0.5**20,
+                    "That is the probability that at least one of all twenty landings is right. A stand-in must have all four right: p = ½⁴.",
+                    id="luck-any-landing",
                 ),
                 Mistake(lambda: 0.5**20, "That all five stand-ins have all landings right. One is enough."),
                 Mistake(

@@ -304,6 +304,18 @@ def _by_tangents(alpha, beta, base, std):
     return std * H**2 / base * np.hypot(1 / np.cos(alpha) ** 2, 1 / np.cos(beta) ** 2)
 
 
+def _by_differences(alpha, beta, base, std, share, both):
+    """Differences of the height, the step being so large a share of std, to one side or to both."""
+    height, step = triangulation.height_from_angles, share * std
+
+    def moved(up, to_the_side):
+        ahead = height(alpha + step * up, beta + step * to_the_side, base)
+        behind = height(alpha - step * up, beta - step * to_the_side, base) if both else height(alpha, beta, base)
+        return (ahead - behind) / (1 + both) / share
+
+    return np.hypot(moved(1, 0), moved(0, 1))
+
+
 def _rotation(change):
     """The fit of moved to seen shifts with something else for one of them, or for what is made of their product."""
 
@@ -380,7 +392,7 @@ ACCURACY = [
         draw=(
             arrivals,
             functools.partial(arrivals, d=2),
-            functools.partial(arrivals, numbers=(2, 4)),
+            functools.partial(arrivals, numbers=(3, 4)),
             functools.partial(arrivals, numbers=(1, 2)),
         ),
         metric=metrics.Numbers(1e-9, "mm"),
@@ -466,7 +478,7 @@ ACCURACY = [
     Exercise(
         "repeatability",
         reference=robot_accuracy.repeatability,
-        draw=(only_arrivals, functools.partial(only_arrivals, d=2), functools.partial(only_arrivals, numbers=(3, 5))),
+        draw=(only_arrivals, functools.partial(only_arrivals, d=2), functools.partial(only_arrivals, numbers=(3, 4))),
         metric=metrics.Numbers(1e-9, "mm"),
         noisy=(
             (
@@ -804,16 +816,18 @@ TRIANGULATION = [
                 "std is in rad already.",
                 id="std-degrees",
             ),
-            Mistake(
-                lambda alpha, beta, base, std: np.hypot(
-                    *(
-                        triangulation.height_from_angles(*angles, base)
-                        - triangulation.height_from_angles(alpha, beta, base)
-                        for angles in ((alpha + std, beta), (alpha, beta + std))
-                    )
-                ),
-                "You moved each angle by a whole standard deviation. To first order it is the derivative times std: take a small step, or the formula.",
-                id="std-finite",
+            *(
+                Mistake(
+                    functools.partial(_by_differences, share=share, both=both),
+                    "You moved each angle by a whole standard deviation, or half of it. To first order it is the derivative times std: "
+                    "take a small step, or the formula.",
+                    id=id,
+                )
+                for share, both, id in (
+                    (1.0, False, "std-finite"),
+                    (1.0, True, "std-finite-both"),
+                    (0.5, True, "std-finite-half"),
+                )
             ),
             Mistake(
                 _std(lambda a, b, s: s * np.hypot(a, b) / 2),

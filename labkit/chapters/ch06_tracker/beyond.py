@@ -95,6 +95,7 @@ STOPS = [
             for n, tol, words in (
                 (1, 1e-8, "a single reading, which is its own mean to all digits"),
                 (2, 2e-4, "two readings"),
+                (4, 2e-4, "four readings, as many as a quaternion has parts"),
                 (300, 2e-4, "300 readings"),
             )
         ),
@@ -600,7 +601,7 @@ STATIONS = [
     Exercise(
         "nearest_to_rays",
         reference=stations.nearest_to_rays,
-        draw=(functools.partial(rays, most=6), functools.partial(rays, most=2)),
+        draw=tuple(functools.partial(rays, most=most) for most in (6, 2, 3)),
         metric=metrics.Numbers(1e-6, "mm"),
         noisy=(
             (many_rays, metrics.Numbers(1e-6, "mm"), "right, but not for thirty rays:"),

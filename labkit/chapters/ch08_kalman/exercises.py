@@ -2508,7 +2508,7 @@ CHAPTER = Chapter(
                     "right, but not for five states and forty measurements, of which little is sure:",
                 ),
                 (
-                    functools.partial(measured_often, n=2, m=3, k=4),
+                    functools.partial(measured_often, n=2, m=3, k=3),
                     STATE_AND_COV,
                     "right, but not for measurements of more numbers than there are states:",
                 ),
