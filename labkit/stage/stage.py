@@ -635,8 +635,12 @@ class Stage:
         return self._picture.in_both_themes()
 
     def small_png(self):
-        """The picture with the rings of its handles, at its own size and in few colors: for files."""
-        return self._picture.small_png([(place["at"], place["color"]) for place in self._places().values()])
+        """The picture with the rings of its handles, at its own size and in few colors: for files.
+
+        It is on light paper, also where the page is dark: what is stored is printed, exported and read elsewhere.
+        """
+        rings = [(place["at"], style.themed(self._handles[key].color, False)) for key, place in self._places().items()]
+        return self._picture.small_png(rings)
 
     def __repr__(self):
         return self._text

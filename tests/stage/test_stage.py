@@ -265,6 +265,16 @@ def test_a_small_picture_shows_the_rings_of_the_handles():
     assert orange.sum() > 40 and len(stage.small_png()) < 20_000
 
 
+def test_what_is_stored_is_on_light_paper_also_where_the_page_is_dark():
+    stage = segment()
+    stage._picture.fit(700, 420, 1, False)
+    stored, light = stage.small_png(), pixels(stage)
+    stage._picture.fit(700, 420, 1, True)
+    dark = pixels(stage)
+    assert stage.small_png() == stored
+    assert (pixels(stage) == dark).all() and (dark != light).any(), "and the page stays dark"
+
+
 def test_png_holds_the_pixels():
     pixels = np.random.default_rng(0).integers(0, 256, (7, 5, 4), dtype=np.uint8)
     assert (np.asarray(Image.open(io.BytesIO(canvas.encode_png(pixels)))) == pixels).all()
