@@ -26,9 +26,9 @@ class Named(Evidence):
 
     def _is_it_again(self, mistake):
         """Whether an answer is equal to a mistake on fresh draws too, where it is one of several, some of them, or a
-        truth value: two rules may decide alike by chance.
+        truth value, or is right on some draws: two rules may decide alike by chance.
         """
-        decides = isinstance(self.exercise.metric, metrics.Exactly)
+        decides = isinstance(self.exercise.metric, metrics.Exactly) or self._right_somewhere()
         if not decides or self.refusal or self._right_on_plain():
             return True
         if isinstance(self.pairs[0][1], str):
