@@ -7,7 +7,7 @@ import itertools
 import pytest
 from hypothesis import settings
 
-from labkit.exercises import budget
+from labkit.exercises import budget, guard
 
 settings.register_profile("the same examples each time", derandomize=True, database=None, deadline=None)
 settings.load_profile("the same examples each time")
@@ -30,6 +30,16 @@ def own_progress(progress_files, monkeypatch):
 def looks_for_explanations_to_the_end(monkeypatch):
     """Else a slow processor would leave wrong answers unexplained that a fast one explains."""
     monkeypatch.setattr(budget, "LOOKING", 30.0)
+
+
+@pytest.fixture(autouse=True)
+def what_is_put_back_after_each_call_is_forgotten():
+    """The guard looks through each library that one test has it remember, after every call of all tests behind it."""
+    before = guard.PRISTINE.saved
+    guard.PRISTINE.saved = dict(before)
+    yield
+    guard.PRISTINE.saved = before
+    guard.PRISTINE.drain()
 
 
 @pytest.fixture

@@ -42,6 +42,7 @@ CHANGING = {
     "time": {"tzname", "timezone", "altzone", "daylight"},  # what `tzset` makes of the environment, which is put back
     "labkit.exercises.budget": {"LOOKING"},  # which `collect` and tests set otherwise
 }
+ENDING = ("_exit", "abort", "kill", "fork", "forkpty", "execv", "system")  # of this process, or into another
 DEPTH = 10_000  # calls within calls, at most: what student code may raise the limit to
 
 
@@ -101,7 +102,7 @@ class Pristine:
     """Remembers what labkit's modules (and the NumPy names they use) held at first sight, and puts it back."""
 
     def __init__(self):
-        self.saved = {}
+        self.saved, self.seen = {}, {}
         self.replaced = []
 
     def look(self):
@@ -122,19 +123,28 @@ class Pristine:
                 self.saved[f"{module.__name__}.{value.__qualname__}"] = (value, methods, len(vars(value)))
 
     def restore(self):
-        """Put back what was replaced, and note the names, e.g. "labkit.geometry.frames.invert", in `replaced`."""
+        """Put back what was replaced, and note the names, e.g. "labkit.geometry.frames.invert", in `replaced`.
+
+        This follows every call, and there are thousands of names: what holds the same things in the same order as when
+        it was last looked through is not looked through again.
+        """
         for name, (owner, then, size) in self.saved.items():
             if size is None and sys.modules.get(name) is not owner:
                 sys.modules[name] = owner
                 self.replaced.append(name)
-            now = vars(owner)
-            # name by name only where one differs: this follows every call, and holds thousands of names
-            if not all(map(operator.is_, map(now.get, then, itertools.repeat(self)), then.values())):
-                self._put_back(name, owner, now, then)
-            if size is not None and len(now) != size:
-                for key in [k for k, v in now.items() if k not in then and isinstance(v, types.FunctionType)]:
-                    delattr(owner, key)  # it stood before what is inherited
-                    self.replaced.append(f"{name}.{key}")
+            now, seen = vars(owner), self.seen.get(name, ())
+            if len(now) != len(seen) or not all(map(operator.is_, now.values(), seen)):
+                self._look_through(name, owner, then, size)
+                self.seen[name] = tuple(vars(owner).values())
+
+    def _look_through(self, name, owner, then, size):
+        now = vars(owner)
+        if not all(map(operator.is_, map(now.get, then, itertools.repeat(self)), then.values())):
+            self._put_back(name, owner, now, then)
+        if size is not None and len(now) != size:
+            for key in [k for k, v in now.items() if k not in then and isinstance(v, types.FunctionType)]:
+                delattr(owner, key)  # it stood before what is inherited
+                self.replaced.append(f"{name}.{key}")
 
     def _put_back(self, name, owner, now, then):
         for key, value in then.items():
@@ -353,28 +363,29 @@ def _forbid(what, original=None):
 
 
 @contextlib.contextmanager
-def _replaced(owner, name, value):
-    """Set an attribute for a while; nothing happens where the owner does not have it."""
-    if not hasattr(owner, name):
-        yield
-        return
-    before = getattr(owner, name)
-    setattr(owner, name, value)
+def _replaced(*triples):
+    """Set attributes, (owner, name, value) each, for a while; nothing happens where an owner does not have one."""
+    before = [(owner, name, getattr(owner, name)) for owner, name, _ in triples if hasattr(owner, name)]
+    for owner, name, value in triples:
+        if hasattr(owner, name):
+            setattr(owner, name, value)
     try:
         yield
     finally:
-        setattr(owner, name, before)
+        for owner, name, value in reversed(before):
+            setattr(owner, name, value)
 
 
-@contextlib.contextmanager
 def only_finite_matrices():
     """Within, what NumPy decomposes must be finite: LAPACK would write of NaN on the terminal, past `sys.stderr`."""
-    with contextlib.ExitStack() as stack:
-        for name in ("lstsq", "pinv", "svd"):
-            stack.enter_context(_replaced(np.linalg, name, _finite_only(getattr(np.linalg, name), name)))
-        yield
+    return _replaced(*_decompositions())
 
 
+def _decompositions():
+    return [(np.linalg, name, _finite_only(getattr(np.linalg, name), name)) for name in ("lstsq", "pinv", "svd")]
+
+
+@functools.lru_cache(32)
 def _finite_only(original, name):
     @standing_for(original)
     def decompose(a, *args, **kwargs):
@@ -404,30 +415,33 @@ class Judging:
 def sandbox(capture):
     """Everything student code may touch, put back afterwards."""
     state = [(put, read()) for read, put in kept.STATE]
-    limit = sys.setrecursionlimit
     with contextlib.ExitStack() as stack:
         stack.enter_context(Judging.on())
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore")
-        stack.enter_context(contextlib.redirect_stdout(capture))
-        stack.enter_context(contextlib.redirect_stderr(capture))
-        stack.enter_context(_replaced(sys, "setrecursionlimit", lambda depth: limit(min(depth, DEPTH))))
-        stack.enter_context(only_finite_matrices())
-        stack.enter_context(_replaced(builtins, "input", _forbid("input()")))
-        stack.enter_context(_replaced(builtins, "breakpoint", _forbid("breakpoint()")))
-        stack.enter_context(_replaced(getpass, "getpass", _forbid("getpass()")))
-        for name in ("_exit", "abort", "kill", "fork", "forkpty", "execv", "system"):
-            stack.enter_context(_replaced(os, name, _forbid(f"os.{name}()", getattr(os, name, None))))
-        stack.enter_context(_replaced(threading.Thread, "start", kept.noting_whose(threading.Thread.start)))
-        for name in ("ask_exit", "run_cell", "system"):
-            words = "exit()" if name == "ask_exit" else f"{name}()"
-            stack.enter_context(_replaced(_shell(), name, _forbid(words)))
+        stack.enter_context(_replaced((sys, "stdout", capture), (sys, "stderr", capture), *_stand_ins()))
         try:
             yield
         finally:
             for put, value in state:
                 with contextlib.suppress(Exception):  # such as a folder that is gone
                     put(value)
+
+
+def _stand_ins():
+    """(owner, name, what stands there while student code runs)."""
+    limit, shell = sys.setrecursionlimit, _shell()
+    words = {"ask_exit": "exit()", "run_cell": "run_cell()", "system": "system()"}
+    return [
+        *_decompositions(),
+        (sys, "setrecursionlimit", lambda depth: limit(min(depth, DEPTH))),
+        (builtins, "input", _forbid("input()")),
+        (builtins, "breakpoint", _forbid("breakpoint()")),
+        (getpass, "getpass", _forbid("getpass()")),
+        *((os, name, _forbid(f"os.{name}()", getattr(os, name, None))) for name in ENDING),
+        (threading.Thread, "start", kept.noting_whose(threading.Thread.start)),
+        *((shell, name, _forbid(said)) for name, said in words.items()),
+    ]
 
 
 def _shell():

@@ -10,6 +10,7 @@ from .evidence import MORE_CASES, Evidence
 from .outcome import NOT_YET
 from .results import Refusal, equal_as_written, failure_of
 
+FEW = 3  # draws on which two rules may well give the same, where they are right on the others
 MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
 
 
@@ -26,14 +27,19 @@ class Named(Evidence):
 
     def _is_it_again(self, mistake):
         """Whether an answer is equal to a mistake on fresh draws too, where it is one of several, some of them, or a
-        truth value, or is right on some draws: two rules may decide alike by chance.
+        truth value, or is wrong on a few draws alone: two rules may decide alike by chance.
         """
-        decides = isinstance(self.exercise.metric, metrics.Exactly) or self._right_somewhere()
+        decides = isinstance(self.exercise.metric, metrics.Exactly) or self._is_seldom_wrong()
         if not decides or self.refusal or self._right_on_plain():
             return True
         if isinstance(self.pairs[0][1], str):
             return self._shows_always(mistake)
         return self._is_it_on(mistake, (self.exercise.plain_again[number] for number in range(MORE_DRAWS)))
+
+    def _is_seldom_wrong(self):
+        metric = self.exercise.metric
+        wrong = [] if metric is None else [pair for pair in self._plain_pairs() if not metric.equal(*pair)]
+        return 0 < len(wrong) <= FEW and self._right_somewhere()
 
     def _shows_always(self, mistake):
         """Whether an answer is a mistake's wherever that is wrong, at special places too: one of a few words may be the

@@ -48,7 +48,7 @@ def table(path):
         return list(csv.DictReader(file))
 
 
-@pytest.mark.parametrize(("boxed", "students", "damaged"), [("none", 4, 1), ("bubblewrap", 7, 2)], indirect=["boxed"])
+@pytest.mark.parametrize(("boxed", "students", "damaged"), [("none", 3, 1), ("bubblewrap", 5, 2)], indirect=["boxed"])
 def test_a_class_is_reported_as_it_was_planted(boxed, students, damaged, tmp_path, capsys):
     planted = write(tmp_path / "class", students, damaged)
     out = tmp_path / "out"
@@ -76,42 +76,48 @@ def test_a_class_is_reported_as_it_was_planted(boxed, students, damaged, tmp_pat
     assert len(list((out / "feedback").iterdir())) == students
 
 
-def test_the_same_input_and_seed_give_the_same_bytes_without_any_name(tmp_path):
-    write(tmp_path / "class", 3, 1, seed=4)
-    for out in ("a", "b"):
-        assert run(collect.main, [str(tmp_path / "class"), "--out", str(tmp_path / out), "--seed", "7"]) == 0
-    first, second = contents(tmp_path / "a"), contents(tmp_path / "b")
+@pytest.fixture(scope="module")
+def class_(tmp_path_factory):
+    """(folder of a class of three, what was planted there, the folder of its reports)."""
+    place = tmp_path_factory.mktemp("class")
+    planted = write(place / "class", 3, 1, seed=4)
+    assert run(collect.main, [str(place / "class"), "--out", str(place / "out"), "--seed", "7"]) == 0
+    return place / "class", planted, place / "out"
+
+
+def test_the_same_input_and_seed_give_the_same_bytes_without_any_name(class_, tmp_path):
+    folder, _, out = class_
+    assert run(collect.main, [str(folder), "--out", str(tmp_path / "again"), "--seed", "7"]) == 0
+    first, second = contents(out), contents(tmp_path / "again")
     assert first == second
-    names = {
-        word for folder in (tmp_path / "class").iterdir() for word in re.split(r"[ _]", folder.name) if len(word) > 3
-    }
+    names = {word for place in folder.iterdir() for word in re.split(r"[ _]", place.name) if len(word) > 3}
     whole = "".join(first) + "".join(data.decode() for data in first.values())
     assert not [name for name in names - {"assignsubmission", "file"} if name in whole]
 
 
-def test_what_is_judged_is_not_judged_again_and_a_changed_file_alone_is(tmp_path, monkeypatch):
-    write(tmp_path / "class", 3, 1, seed=4)
-    arguments = [str(tmp_path / "class"), "--out", str(tmp_path / "out"), "--seed", "7"]
-    assert run(collect.main, arguments) == 0
-    stamps = {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / "judged").iterdir()}
-    changed = sorted((tmp_path / "class").rglob("*.ipynb"))[0]
+def test_what_is_judged_is_not_judged_again_and_a_changed_file_alone_is(class_, tmp_path):
+    folder, out = shutil.copytree(class_[0], tmp_path / "class"), shutil.copytree(class_[2], tmp_path / "out")
+    stamps = {path: path.stat().st_mtime_ns for path in (out / "judged").iterdir()}
+    changed = sorted(folder.rglob("*.ipynb"))[0]
     changed.write_text("{}", encoding="utf-8")
-    assert run(collect.main, arguments) == 0
-    new = {path for path in (tmp_path / "out" / "judged").iterdir() if stamps.get(path) != path.stat().st_mtime_ns}
+    assert run(collect.main, [str(folder), "--out", str(out), "--seed", "7"]) == 0
+    new = {path for path in (out / "judged").iterdir() if stamps.get(path) != path.stat().st_mtime_ns}
+    assert len(stamps) > 1
     assert [json.loads(path.read_text())["unreadable"] for path in new] == ["is no notebook: it holds no code cells"]
 
 
-def test_one_file_and_merge_come_to_the_same_as_all_at_once(tmp_path, capsys):
-    planted = write(tmp_path / "class", 2, 0, seed=9)
-    right = [id for answers in planted.values() for id, (status, _) in answers.items() if status == "correct"]
-    whole, parts = tmp_path / "whole", tmp_path / "parts"
-    assert run(collect.main, [str(tmp_path / "class"), "--out", str(whole), "--seed", "7"]) == 0
-    for path in (tmp_path / "class").rglob("*.ipynb"):
-        assert run(collect.main, ["--one", str(path), "--out", str(parts), "--seed", "7"]) == 0
+def test_one_file_and_merge_come_to_the_same_as_all_at_once(class_, tmp_path, capsys):
+    folder, planted, whole = class_
+    answers = [truth for truth in planted.values() if not isinstance(truth, str)]
+    right = [id for truth in answers for id, (status, _) in truth.items() if status == "correct"]
+    for key, truth in planted.items():
+        (path,) = folder.glob(f"*_{key}_*/*")
+        ended = run(collect.main, ["--one", str(path), "--out", str(tmp_path), "--seed", "7"])
+        assert ended == isinstance(truth, str), "one that cannot be read is a refusal"
     said = capsys.readouterr().out
     assert right and all(f"correct       {id}" in said for id in right)
-    assert run(collect.main, ["--merge", str(tmp_path / "class"), "--out", str(parts), "--seed", "7"]) == 0
-    assert contents(whole) == contents(parts)
+    assert run(collect.main, ["--merge", str(folder), "--out", str(tmp_path), "--seed", "7"]) == 0
+    assert contents(whole) == contents(tmp_path)
 
 
 # --- attacks --------------------------------------------------------------------------------------------------------
