@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import guard, scope
+from . import guard, scope, shapes
 from . import steps as own_steps
 from .explanations import Explanations
 from .outcome import NOT_YET, RAISED, TO_DO
@@ -77,12 +77,18 @@ class Raised(Explanations):
         said = run.said or WORDLESS.get(type(error), "" if isinstance(error, AssertionError) else "it says no more")
         if isinstance(error, AssertionError) and not said:
             said = "`assert` raises; an answer is handed over with `return`"
-        handed = scope.handed_over(error, dict(zip(self._names(args), args)), self.exercise.reference)
-        advice = handed or next((f". {told}" for words, told in ADVICE.items() if re.search(words, said)), "")
+        advice = self._advice(error, args, said)
         if not (advice or args or run.line):
             advice = ". What your function returned could not be worked with."
         where = f"\nin {run.line}" if run.line else ""
         return self.outcome(RAISED, f"{type(error).__name__}: {said}{advice}{where}{self._given(error, args, words)}")
+
+    def _advice(self, error, args, said):
+        """What an error means, as one more sentence, "" where that is not known."""
+        handed = scope.handed_over(error, dict(zip(self._names(args), args)), self.exercise.reference)
+        meant = (told for words, told in ADVICE.items() if re.search(words, said))
+        told = handed or shapes.strange_size(said, args) or next(meant, "")
+        return told if handed or not told else f". {told}"
 
     def _given(self, error, args, words):
         """The call that raised, as a line; of a property, what it says it gave."""

@@ -4,8 +4,12 @@ The numbers may be right and stand in the wrong place: the diagonal for the matr
 results. What is said holds on all draws.
 """
 
+import re
+import types
+
 import numpy as np
 
+UNFIT = re.compile(r"broadcast .*?shapes? (\([\d, ]*\)) (?:into shape )?(\([\d, ]*\))")  # as NumPy says it
 MOST = 6  # entries, rows or columns that are tried one by one
 LARGEST = 10_000  # entries of a result that is looked at
 DEPTH = 8  # lists within lists: more than any array of the course has axes, and one that holds itself has no end
@@ -35,6 +39,40 @@ def shape_words(results, expected, names=()):
         if _holds(results, expected, lambda r, e, change=change: (change(r), e)):
             return words
     return None
+
+
+def strange_size(said, args):
+    """Which one of two sizes that do not fit entry by entry no argument has, in words; "" where it is not one alone.
+
+    Parameters
+    ----------
+    said : str
+        NumPy's words.
+    args : sequence
+        The arguments of the call.
+    """
+    found, known = UNFIT.search(said), [_sizes_of(arg) for arg in args]
+    if not found or None in known:
+        return ""
+    one, other = (re.findall(r"\d+", shape)[::-1] for shape in found.groups())
+    unfit = {int(n) for pair in zip(one, other) for n in pair if pair[0] != pair[1] and "1" not in pair}
+    strange = unfit.difference(*known)
+    if len(strange) != 1 or len(unfit) != 2:
+        return ""
+    size = f"no argument of this call has a size of {strange.pop()}"
+    return f"Entry by entry these shapes do not fit, and {size}: is it typed in, is an entry too many or missing?"
+
+
+def _sizes_of(value):
+    """Lengths of an argument, and its value where it counts something; None where it is of another kind."""
+    if isinstance(value, list | tuple):
+        parts = [_sizes_of(part) for part in value]
+        return None if None in parts else {len(value)}.union(*parts)
+    if isinstance(value, np.ndarray):
+        return {*value.shape, value.size}
+    if isinstance(value, int | np.integer):
+        return {int(value)}
+    return {len(value)} if isinstance(value, str) else set() if isinstance(value, float | types.FunctionType) else None
 
 
 def _of_several(results, expected, names):

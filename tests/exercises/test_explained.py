@@ -359,6 +359,23 @@ def test_of_two_results_the_right_one_is_told():
     assert "Right are: sine." in told(item, "return np.sin(x), np.cos(x) + std**2.7 - 0.1 * x**4")
 
 
+@pytest.mark.parametrize(
+    "said, args, told",
+    [
+        ("operands could not be broadcast together with shapes (5,) (2,) ", (np.ones(5), 0.1, len), None),
+        ("operands could not be broadcast together with shapes (5,) (2,) ", (np.ones(5), 0.1, exercise), "size of 2:"),
+        ("operands could not be broadcast together with shapes (4,3) (5,3) ", ([np.ones((4, 3))], "a"), "size of 5:"),
+        ("could not broadcast input array from shape (3,) into shape (2,)", (np.ones((7, 3)),), "size of 2:"),
+        ("operands could not be broadcast together with shapes (6,) (2,) ", (np.ones((2, 3)),), None),
+        ("operands could not be broadcast together with shapes (6,) (2,) ", (np.ones(5),), None),
+        ("operands could not be broadcast together with shapes (6,1,4) (6,2,5) ", (np.ones((6, 5)),), "size of 4:"),
+    ],
+)
+def test_a_size_that_no_argument_has_is_told(said, args, told):
+    words = shapes.strange_size(said, args)
+    assert told in words if told else words == ""
+
+
 def test_one_call_is_shown_with_what_it_gives_and_with_the_right_word():
     item = exercise(lambda x, std: float(np.sin(x) * std + x**2), lambda rng: (rng.uniform(1, 3), rng.uniform(1, 2)))
     text = told(item, "return np.tan(x) * std + 0.3 * x**3 + (std > 1.5)")
