@@ -455,6 +455,7 @@ def _of_few_digits(rng, lost):
     """One entry and an average with two digits swapped; or whole numbers, of which one lost its first digit."""
     if lost:
         values = rng.integers(11, 60, 4)
+        values[0] += values.sum() % 4 == 0  # the mean is not whole, so that it takes their half units to explain it
         return [str(value) for value in rng.permutation(values)], str(round(values.mean() + 25))
     tens, ones = rng.choice(np.arange(1, 10), 2, replace=False)
     return [f"{tens}{ones}.5"], f"{ones}{tens}.5"
@@ -920,6 +921,11 @@ SUSPECTS = Exercise(
                 "entries and average hide.",
             )
             for fixed in (0.01, 0.05, 0.1)
+        ),
+        Mistake(
+            lambda entries, average: suspects([str(float(text)) for text in entries], str(float(average))),
+            "float() forgets how many digits were printed: 54.940 has three decimals. Take half units and slips from "
+            "the texts as they are.",
         ),
         Mistake(
             _search(places=lambda n: [n]),
