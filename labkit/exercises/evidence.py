@@ -129,7 +129,8 @@ class Evidence:
 
     def _about_globals(self):
         """A line about data of the notebook that the function reads, which a checked function is not given."""
-        names = ", ".join(f"`{name}`" for name in scope.notebook_data(self.function))
+        filled = self.defaults.changed  # by the function itself: nobody hands that in
+        names = ", ".join(f"`{name}`" for name in scope.notebook_data(self.function) if name not in filled)
         if not names:
             return ""
         return f"\nYour function reads {names} from the notebook: what it computes with should come in as an argument."

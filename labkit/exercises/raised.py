@@ -13,6 +13,8 @@ from .wording import closed, leading
 
 BEFORE = "It was right before, on other draws: what is different about this one?"
 OTHER_SHAPES = "It was right before, on other draws: what is different about this one, its shapes perhaps?"
+OWN_REFUSAL = re.compile(r"line \d+: (raise|assert)\b")
+IN_ORDER = "This call is in order, and nothing in it is to be refused."
 WORDLESS = {  # what is raised without a word
     MemoryError: "your code asks for more memory than there is",
     KeyboardInterrupt: "the check was interrupted",
@@ -81,7 +83,7 @@ class Raised(Explanations):
         if not (advice or args or run.line):
             advice = ". What your function returned could not be worked with."
         where = f"\nin {run.line}" if run.line else ""
-        return self.outcome(RAISED, f"{type(error).__name__}: {said}{advice}{where}{self._given(error, args, words)}")
+        return self.outcome(RAISED, f"{type(error).__name__}: {said}{advice}{where}{self._given(run, args, words)}")
 
     def _advice(self, error, args, said):
         """What an error means, as one more sentence, "" where that is not known."""
@@ -90,11 +92,13 @@ class Raised(Explanations):
         told = handed or shapes.strange_size(said, args) or next(meant, "")
         return told if handed or not told else f". {told}"
 
-    def _given(self, error, args, words):
+    def _given(self, run, args, words):
         """The call that raised, as a line; of a property, what it says it gave."""
         if not args:
-            return f"\nwhen given {error.given}" if hasattr(error, "given") else ""
+            return f"\nwhen given {run.error.given}" if hasattr(run.error, "given") else ""
         told = f"\nwhen called as {self._call(args)}"
+        if OWN_REFUSAL.match(run.line):
+            told += f"\n{IN_ORDER}"
         if self.pairs and all(m and m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)):
             told += f"\n{leading(words) or self._special_case(args) or self._before(args)}"
         return told + self._about_globals()

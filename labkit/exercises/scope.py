@@ -13,6 +13,7 @@ from . import guard
 
 OWN_ROOMS = ("labkit.chapters.", "labkit.exercises.", "labkit.stage.", "labkit.verbs.")
 DATA_TYPES = (int, float, complex, list, tuple, dict, set)
+FILLED = (list, dict, set, np.ndarray)  # what one call can change for the next
 
 
 class TwinCalled(guard.Forbidden):
@@ -149,10 +150,22 @@ def may_keep(function):
     """Whether something may stay from one call of a function to the next: data of the notebook that it reads, a name of
     the notebook that it binds, a default that can be changed.
     """
-    code = getattr(function, "__code__", None)
-    binds = isinstance(code, types.CodeType) and any(i.opname == "STORE_GLOBAL" for i in dis.get_instructions(code))
     defaults = getattr(function, "__defaults__", None) or ()
-    return binds or any(isinstance(d, list | dict | set) for d in defaults) or bool(notebook_data(function))
+    filled = any(isinstance(default, FILLED) for default in defaults)
+    return filled or bool(_bound(function) or notebook_data(function))
+
+
+def could_change(function):
+    """Names of the notebook's data that a function could leave changed: what can be filled, and what it binds."""
+    filled = [name for name in notebook_data(function) if type(function.__globals__[name]) in FILLED]
+    return list(dict.fromkeys([*filled, *_bound(function)]))
+
+
+def _bound(function):
+    """Names of the notebook that a function binds."""
+    code = getattr(function, "__code__", None)
+    instructions = dis.get_instructions(code) if isinstance(code, types.CodeType) else ()
+    return [i.argval for i in instructions if i.opname == "STORE_GLOBAL"]
 
 
 def _names(code):

@@ -7,7 +7,7 @@ import itertools
 from . import budget, guard, scope
 from .budget import Budget
 from .evidence import Evidence
-from .results import admitted_by, could_change, is_another, numbers_of, same_numbers
+from .results import Refusal, admitted_by, could_change, is_another, numbers_of, same_numbers
 
 REPEATING = 0.02  # seconds of processor time in which an answer that came out right is called again
 IN_A_ROW = 8  # times that a draw is called then, of each of ...
@@ -33,7 +33,7 @@ class Staying(Evidence):
         admitted = functools.partial(admitted_by, self.metrics[draw], self.pairs[draw][1])
         run = guard.run(self.function, self.inputs[draw], admitted, self.exercise.limit)
         if first is None:
-            return self._kept_words(run.error) if is_another(before, run) else None
+            return self._stays_words(run.error) if is_another(before, run) else None
         if not same_numbers(numbers_of(before), first):
             return (
                 "your function returns one and the same array at every call: a later call overwrites what an earlier "
@@ -41,22 +41,43 @@ class Staying(Evidence):
             )
         if run.error is None and same_numbers(numbers_of(run.result), first):
             return None
-        return self._kept_words(run.error)
+        return self._stays_words(run.error)
+
+    def _stays_words(self, error):
+        return self._left_behind() or self._kept_words(error)
+
+    def _left_behind(self):
+        """Where the function keeps what spoils its results, if each of them is right with all of that as at first."""
+        if self.exercise.metric is None or not self.defaults.may_fill:
+            return None
+        kind = Budget(budget.SPECIAL)
+        for args, metric, (_, expected) in zip(self.inputs, self.metrics, self.pairs):
+            if not kind.left() or not self._is_right_on(self.defaults.fresh, args, metric, expected):
+                return None
+        return self.defaults.words()
+
+    def _is_right_on(self, function, args, metric, expected):
+        """Whether another function succeeds where the student's has not."""
+        run = guard.run(function, args, functools.partial(admitted_by, metric, expected), self.exercise.limit)
+        came = run.error is None and metric is not None and not isinstance(run.result, Refusal)
+        return came and metric.equal(run.result, expected)
 
     def _kept_words(self, error, calls=2):
         told = "stops with an error" if error is not None else "gives another result"
         often, at = ("twice", "the second time") if calls == 2 else ("several times", "in the end")
-        return (
-            f"called {often} with the same arguments, your function {told} {at}. Does something stay from "
-            "call to call, a global variable or a default argument that is changed? Or is something drawn at random?"
-        )
+        cause = "Does something stay from call to call, a global variable or a default argument that is changed?"
+        if names := self.defaults.changed_names:
+            cause = f"It leaves {names} changed for the next call: does the result follow from that?"
+        told = f"called {often} with the same arguments, your function {told} {at}"
+        return f"{told}. {cause} Or is something drawn at random?"
 
     def repeated(self):
         """What stays from call to call, if an answer that came out right does so no more when it is called again."""
         if self.exercise.metric is None or "rng" in self.exercise.arguments:
             return None
         again = functools.partial(self._again_words, kind=Budget(REPEATING))
-        return guard.run(again, (self.function,), limit=self.exercise.limit + REPEATING, author=self.function).result
+        run = guard.run(again, (self.function,), limit=self.exercise.limit + REPEATING, author=self.function)
+        return run.result and (self._left_behind() or run.result)
 
     def _again_words(self, function, kind):
         """`repeated`, in one run of the guard: the calls themselves are quick."""

@@ -1,14 +1,13 @@
 """One check in progress: draws, properties, and the verdict on what came of them."""
 
 import copy
-import functools
 
 from . import guard, metrics, scope
 from .budget import seconds
 from .explanations import NOT_RIGHT
 from .outcome import CORRECT, NOT_YET
 from .raised import Raised
-from .results import Refusal, admitted_by
+from .results import Refusal
 from .staying import Staying
 from .wording import closed, leading
 
@@ -61,19 +60,13 @@ class Trial(Raised, Staying):
         """Check one property of the student's function, guarded like a call."""
         again = copy.deepcopy(rng)
         run = self._run_property(holds, self.function, rng)
-        if self.defaults.may_fill and (run.error is not None or run.result):
+        if (run.error is not None or run.result) and self.defaults.may_fill:
             run = self._run_property(holds, self.defaults.fresh, again)  # what is left over is told apart from the rest
             if run.error is None and not run.result:
                 return self.outcome(NOT_YET, self.defaults.words())
         if run.error is not None:
             return self._raised(run, ())
         return self.outcome(NOT_YET, f"{run.result}{self._about_globals()}") if run.result else None
-
-    def _is_right_on(self, function, args, metric, expected):
-        """Whether another function succeeds where the student's has stopped."""
-        run = guard.run(function, args, functools.partial(admitted_by, metric, expected), self.exercise.limit)
-        came = run.error is None and metric is not None and not isinstance(run.result, Refusal)
-        return came and metric.equal(run.result, expected)
 
     def _run_property(self, holds, function, rng):
         return guard.run(holds, (function, rng), limit=self.exercise.limit, author=self.function)
@@ -83,7 +76,8 @@ class Trial(Raised, Staying):
         if all(m is None or m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)) and not self.refusal:
             named = self._named_mistake() if self.exercise.metric is None else None
             return named or self.outcome(CORRECT)
-        kept = self._kept() if scope.may_keep(self.function) else None  # else by chance the results may be a mistake's
+        keeps = scope.may_keep(self.function)  # else by chance the results may be a mistake's
+        kept = self._kept() or self._left_behind() if keeps else None
         named = None if kept else self._named_mistake() or self._named_in_parts()
         if named:
             return named

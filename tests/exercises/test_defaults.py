@@ -1,6 +1,7 @@
 """A default argument that is filled stays from call to call: who is right but for that hears of it."""
 
 import numpy as np
+import pytest
 
 from labkit.exercises import metrics
 from labkit.exercises.engine import Exercise
@@ -40,6 +41,60 @@ def test_a_property_that_fails_on_what_is_left_over_is_told():
         return 2 * v + (len(seen) > 1 and not v.any())
 
     assert "into `seen` is still there" in judged(double).text
+
+
+FOUND, FIRST = {}, None
+
+
+def finds_by_size(v):
+    if len(v) not in FOUND:
+        FOUND[len(v)] = 2 * v
+    return FOUND[len(v)]
+
+
+def takes_the_first(v):
+    global FIRST
+    FIRST = v if FIRST is None else FIRST
+    return FIRST + v
+
+
+def fills_its_default(v, done=np.zeros(2)):  # noqa: B008, what is made once is the slip
+    done += 2 * v
+    return done.copy()
+
+
+@pytest.mark.parametrize(
+    "answer, name", [(finds_by_size, "FOUND"), (takes_the_first, "FIRST"), (fills_its_default, "done")]
+)
+def test_who_is_right_with_all_as_at_first_hears_what_is_kept(answer, name, monkeypatch):
+    monkeypatch.setitem(globals(), "FOUND", {})
+    monkeypatch.setitem(globals(), "FIRST", None)
+    told = judged(answer).text
+    assert f"into `{name}` is still there in the next" in told and "should come in as an argument" not in told
+
+
+def test_a_list_that_counts_calls_is_named_though_a_fresh_one_would_not_mend_it(monkeypatch):
+    monkeypatch.setitem(globals(), "FOUND", {0: 1})
+    told = judged(lambda v: FOUND.setdefault(len(FOUND), 3 + len(FOUND)) * v).text
+    assert "It leaves `FOUND` changed for the next call" in told
+
+
+def test_data_of_the_notebook_that_stay_as_they_are_were_not_put_there_by_a_call(monkeypatch):
+    monkeypatch.setitem(globals(), "FOUND", {2: np.ones(2)})
+    assert judged(lambda v: v + FOUND[len(v)]).text.endswith(
+        "reads `FOUND` from the notebook: what it computes with should come in as an argument."
+    )
+
+
+def test_a_refusal_of_what_is_in_order_is_said_to_be_one():
+    def double(v):
+        if v[0] < 5:
+            raise ValueError("too small")
+        return 2 * v
+
+    assert "\nThis call is in order, and nothing in it is to be refused.\n" in judged(double).text
+    told = judged(lambda v: 2 * v[5]).text
+    assert "IndexError" in told and "in order" not in told
 
 
 def test_what_is_wrong_without_it_is_told_as_ever():

@@ -1041,11 +1041,12 @@ def test_a_tolerance_may_shrink_with_what_is_expected():
 @pytest.mark.parametrize(
     "function, words",
     [
-        (keeps_a_sum, "called twice with the same arguments"),
+        (keeps_a_sum, "into `KEPT` is still there in the next"),
         (fills_one_array, "one and the same array at every call"),
     ],
 )
-def test_what_stays_between_calls_is_told(function, words):
+def test_what_stays_between_calls_is_told(function, words, monkeypatch):
+    monkeypatch.setitem(globals(), "KEPT", [])
     assert words in DOUBLE.judge(function, rng=np.random.default_rng(0)).text
 
 

@@ -956,7 +956,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: 180 - np.rad2deg(frames.rotation_angle(_K0_T_K1())),
-                    "This is 180 deg less the angle, as far above 90 deg as K1 is turned by less: a sign, or a direction, is turned around.",
+                    "This is 180 deg less the angle: a sign, or a direction, is turned around.",
                     id="angle-turned-around",
                 ),
                 Mistake(
