@@ -8,6 +8,7 @@ import re
 import numpy as np
 
 ENTRIES = 4  # of a short vector, that are looked at one by one
+COLUMNS = range(1, 10)  # how many a matrix of several may have, at most, to be told apart
 WAYS = 1000  # in which as many draws could have been missed: with fewer, one of some fifty traits may fit by chance
 PAIRS = 200  # times as many ways where two traits are told together: there are so many more of them
 LENGTH = re.compile(
@@ -137,11 +138,21 @@ def _of_value(here, value):
             f"{here} has one entry": len(value) == 1,
             f"{here} holds the same text twice": len(set(value)) < len(value),
         }
+    several = _of_arrays(here, value) if isinstance(value, list | tuple) else {}
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
+        return several
+    return several | _of_array(here, array)
+
+
+def _of_arrays(here, arrays):
+    """The same of several matrices, which need not be of one size."""
+    if not arrays or not all(isinstance(a, np.ndarray) and a.ndim == 2 for a in arrays):
         return {}
-    return _of_array(here, array)
+    most = max(a.shape[1] for a in arrays)
+    found = {f"a matrix in {here} has more than {n} columns": most > n for n in COLUMNS}
+    return found | _of_count(here, ("entry", "entries"), len(arrays))
 
 
 def _of_text(here, text):

@@ -72,6 +72,7 @@ WITHOUT = {
 REDUCTIONS = {"sum", "mean", "median", "std", "var", "prod", "max", "min", "norm", "argmax", "argmin", "any", "all"}
 COARSE, FINE = 1e-6, 1e-6  # from which on a bound or a step of differences may be too large, and what part of it is not
 FINER = -1  # the rank of what is made finer: few changes, tried by themselves, before others make loops without an end
+ADDED = 0.01  # up to which a number that is added may be there to keep a divisor from 0
 ITERATION = 20  # rounds of a loop that goes on until nothing changes, and not through what is given
 ROUNDS = 200  # of a loop, or ten times as many as it has: enough for what converges
 STACKS = {"column_stack", "hstack", "vstack", "stack", "concatenate"}
@@ -203,6 +204,32 @@ def _sizes(function):
             yield Change("", f"it counts all numbers, and `{ast.unparse(new)}` belongs there", 1, node, put(new))
 
 
+def _of_diagonals(function):
+    """Sums of rows or columns where the diagonal is meant, and a matrix with all but its diagonal set to 0."""
+    for node, put in _parts(function):
+        inner = _summed_along(node)
+        if inner is not None:
+            new = _numpy("diag", inner)
+            yield Change("", f"sums stand where the diagonal belongs, `{ast.unparse(new)}`", 2, node, put(new))
+        inner = _first_argument(_first_argument(node, "diag"), "diag")
+        if inner is not None:
+            mends = f"all but the diagonal is set to 0, and all of `{ast.unparse(inner)}` belongs there"
+            yield Change("", mends, 1, node, put(inner))
+
+
+def _summed_along(node):
+    """What is summed along one axis, as an argument or as the owner of the method; None in any other part."""
+    if not isinstance(node, ast.Call) or _called(node) != "sum" or [k.arg for k in node.keywords] != ["axis"]:
+        return None
+    return node.args[0] if node.args else getattr(node.func, "value", None)
+
+
+def _first_argument(node, name):
+    """The only argument of a call of this name; None where it is anything else."""
+    alone = isinstance(node, ast.Call) and _called(node) == name and len(node.args) == 1 and not node.keywords
+    return node.args[0] if alone else None
+
+
 def _lost_signs(function):
     """Roots of 1 less the square of a sine or a cosine: the other of the two, which has a sign."""
     bound = dict(_bound_turns(function))
@@ -315,8 +342,8 @@ def _indices(function):
 def mending(function):
     """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer,
     gone on with or begun at 0, an axis, an outer product, an index that a loop should count, an argument or a size that
-    is typed in, a pi of three digits, the sign that a root has lost, and one slip mended wherever it stands: who copies
-    a line copies its slip.
+    is typed in, a pi of three digits, the sign that a root has lost, a diagonal that is meant or is not, and one slip
+    mended wherever it stands: who copies a line copies its slip.
     """
     found = changes(function)
     narrower = list(_narrower(function, found))
@@ -334,6 +361,7 @@ def mending(function):
     ]
     found += [*_shorter_steps(function), *_rounded_pi(function), *_never_reached(function), *_unstacked(function)]
     found += _lost_signs(function)
+    found += _of_diagonals(function)
     found += _sizes(function)
     return sorted(found, key=lambda change: change.rank)
 
@@ -463,12 +491,19 @@ def _number(node):
 
 
 def _finer(function):
-    """Numbers that end a loop, bound a case or make a step of differences, so small or large that they do no harm."""
+    """Numbers that end a loop, bound a case, keep a divisor from 0 or make a step of differences, so small or large
+    that they do no harm.
+    """
     for owner in ast.walk(function):
         if isinstance(owner, ast.Compare) and len(owner.ops) == 1:
             number = owner.comparators[0]
             if _is_coarse(number) and isinstance(owner.ops[0], ast.Lt | ast.LtE | ast.Gt | ast.GtE):
                 yield _with_a_millionth(FINER, owner, ((owner, "comparators", [ast.Constant(FINE * number.value)]),))
+        elif isinstance(owner, ast.BinOp) and isinstance(owner.op, ast.Add):
+            for side in ("left", "right"):
+                number = getattr(owner, side)
+                if _is_coarse(number, ADDED):
+                    yield _with_a_millionth(FINER, owner, ((owner, side, ast.Constant(FINE * number.value)),))
         elif isinstance(owner, ast.Assign) and _is_coarse(owner.value):
             yield _with_a_millionth(2, owner, ((owner, "value", ast.Constant(FINE * owner.value.value)),))
         elif isinstance(owner, ast.For) and getattr(getattr(owner.iter, "func", None), "id", "") == "range":
@@ -636,12 +671,13 @@ def _with_a_part(place, field, step):
         yield Change("", mends, FINER, place, ((place, field, [*place.args[:2], new] if field == "args" else new),))
 
 
-def _is_coarse(node):
-    return isinstance(node, ast.Constant) and type(node.value) is float and COARSE <= node.value <= 1.0
+def _is_coarse(node, most=1.0):
+    return isinstance(node, ast.Constant) and type(node.value) is float and COARSE <= node.value <= most
 
 
 def _with_a_millionth(rank, place, sets):
-    number = place.value if isinstance(place, ast.Assign) else place.comparators[0]
+    owner, field, _ = sets[0]
+    number = owner.comparators[0] if field == "comparators" else getattr(owner, field)
     mends = f"`{ast.unparse(number)}` is far too large: a millionth of it will do"
     for _, _, new in sets:
         _locate(new[0] if isinstance(new, list) else new, number)

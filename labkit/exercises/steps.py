@@ -31,7 +31,9 @@ SCALED = re.compile(  # of a choice, which does not depend on how large all is t
 CURVED = re.compile(
     "its (log|exp|sine|tangent|inverse|reciprocal)"
 )  # of a word or a set: what is small is made a little more
-LIFTED = re.compile("a thousand|divided by its( own)? length")  # what brings a number over a bound, whatever is wrong
+LIFTED = re.compile(  # what brings a number over a bound, whatever is wrong
+    "a thousand|divided by its( own)? length|multiplied by the length of"
+)
 NAMES = re.compile(r"[^\W\d]\w*")
 FIRST_ROUND = "it is right in the first round, not in all behind it"
 ONE_ENTRY, ONE_ROW = re.compile(r"\bentry\b"), re.compile(r"\brow(?=s?\b)")  # of a value that has several rounds
@@ -249,8 +251,10 @@ class Search:
         return self._turned_words(("value", k, change, None) for k in truths for change in rerun.ALWAYS_THE_SAME)
 
     def _weight_words(self, line, mends):
-        """What a line binds, where a change of it mends only because that is 1 everywhere then, or as good as 1."""
-        if not mends.endswith((TOO_MANY, "is too much")):
+        """What a line binds, where a change of it mends only because that is 1 everywhere then, or as good as 1: with
+        another sign what a bound keeps above 0 is that bound everywhere.
+        """
+        if not mends.endswith((TOO_MANY, "is too much", TURNED, "the sign is the other one")):
             return None
         for k, (at, *_) in enumerate(self.written.places):
             if at != line or not self._binds(k) or not all(values[k][0] for values in self.values):
@@ -292,7 +296,8 @@ class Search:
     def _left_out_instead(self, number):
         """What says more than a change that mends only because it makes a part do nothing: that a case is never to be
         met, or always, where what it asks, in its line or before it, is changed otherwise than to a finer bound; that a
-        part is too many, where it has another sign; that nothing is to be bounded, where another bound is set.
+        part is too many, where it has another sign or is made finer; that nothing is to be bounded, where another bound
+        is set.
         """
         changes = self.written.changes
         line, code, mends = changes[number][1:]
@@ -306,7 +311,7 @@ class Search:
         case += [
             k for k, (_, at, _, words) in enumerate(changes) if at >= line and words in UNBOUNDED and _is_fixed(code)
         ]
-        plan = self.mending([("code", k) for k in case + (less if " stands where " in mends else [])])
+        plan = self.mending([("code", k) for k in case + (less if finer or " stands where " in mends else [])])
         return number if plan is None else plan[1]
 
     # Values on the way turned into others
@@ -691,6 +696,8 @@ class Search:
         if True in again:  # what the name stands for in the end is not what is bound there
             units, right = units[: again.index(True)], right[: again.index(True)]
         known = units[: right.index(False)] if False in right else units
+        of_notebook = min(self._of_notebook(), default=len(self.written.places))
+        known = [k for k in known if k < of_notebook]  # what is the same whatever is given may be wrong, and is no unit
         if not known:
             return None
         names = dict.fromkeys(self._called(k) for k in known if self.written.places[k][2])
@@ -699,8 +706,8 @@ class Search:
         told = f"As far as {told} your values are those of the solution"
         if len(known) == len(units) or not self._has_counterpart(units[len(known)], solution):
             return told
-        if min(self._of_notebook(), default=units[-1]) < units[len(known)]:
-            return told  # what is the same whatever is given may be wrong before
+        if of_notebook < units[len(known)]:
+            return told
         line, code, *_ = self.written.places[units[len(known)]]
         first = f"`{code}` in line {line} is the first behind that is not among them"
         return f"{told}; {first}. Look from there on, unless you go another way than it does"

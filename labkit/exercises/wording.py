@@ -6,6 +6,8 @@ import re
 import numpy as np
 
 SHOWN = 4  # entries of a set or vector that is shown whole
+WHERE = "as long as|where|for|in|on|near|away|without|to"  # what an answer is said to be right of
+RIGHT_WHERE = re.compile(f"^([Rr]ight)(?=, but not | (?!in ordinary )({WHERE}) )")
 NOISY = "exact on clean data, but noise enters otherwise than it should: on noisy data"
 
 
@@ -59,4 +61,4 @@ def leading(words):
 
 def in_ordinary_cases(text):
     """What is said to be right but for one kind of case, said of ordinary cases alone: other kinds may be wrong too."""
-    return re.sub("^([Rr])ight, but not ", r"\1ight in ordinary cases, but not ", text)
+    return RIGHT_WHERE.sub(r"\1 in ordinary cases", text)

@@ -210,6 +210,15 @@ def test_a_link_may_turn_and_step_either_way():
     texts("dh_matrix", no_way_back)
 
 
+def test_what_is_wrong_for_two_kinds_of_values_is_not_called_right_but_for_one():
+    def kept_from_0(values, factor=4.0):
+        d = np.abs(values - np.median(values))
+        return d / (1.4826 * np.median(d) + 1e-3) <= factor
+
+    told = texts("reject_outliers", kept_from_0)
+    assert all(text.startswith("Right in ordinary cases as long as fewer than half") for text in told)
+
+
 def test_quartiles_are_no_median_of_distances():
     def quartiles(values, factor=4.0):
         low, middle, high = np.percentile(values, [25, 50, 75])

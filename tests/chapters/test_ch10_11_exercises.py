@@ -448,7 +448,16 @@ def test_what_is_told_of_a_wrong_answer(module, id, text, told):
 def test_a_special_case_is_told_before_what_is_wrong_with_the_shape_of_its_result():
     text = "def between_axes(T, apart):\n    return np.squeeze(reference(T, apart))"
     told = told_of(own, "between_axes", text, reference=own.motion.between_axes)
-    assert told.startswith("Right for several pairs, but not where one pair alone is to be compared")
+    assert told.startswith("Right in ordinary cases for several pairs, but not where one pair alone is to be compared")
+
+
+def test_of_the_notebooks_data_nothing_is_called_right():
+    text = """def motions(T_BF, T_ST):
+    A = np.linalg.inv(robot[:-1]) @ robot[1:]
+    B = T_ST[:-1] @ np.linalg.inv(T_ST[1:])
+    return A, B"""
+    told = told_of(own, "motions", text, robot=np.stack(24 * [np.eye(4)]))
+    assert "got shape (23, 4, 4)" in told and "As far as" not in told
 
 
 def test_rules_that_choose_alike_by_chance_are_told_apart():

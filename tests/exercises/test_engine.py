@@ -19,7 +19,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from labkit.chapters.ch01_frames.exercises import CHAPTER, random_pose
-from labkit.exercises import feedback, guard, metrics, progress, session, slips, source, staying
+from labkit.exercises import feedback, guard, metrics, progress, session, slips, source, staying, wording
 from labkit.exercises.engine import Chapter, Exercise, Prediction
 from labkit.exercises.feedback import Panel
 from labkit.exercises.outcome import CORRECT, NOT_YET, RAISED, TO_DO, Mistake
@@ -995,7 +995,8 @@ def test_the_pole_is_checked_apart():
 
     exercise = CHAPTER["kuka_from_matrix"]
     assert "rounding noise" in exercise.judge(one_by_one).text
-    assert exercise.judge(zero_at_the_pole).text.startswith("right away from the pole, but not at B = 90 deg:")
+    told = "right in ordinary cases away from the pole, but not at B = 90 deg:"
+    assert exercise.judge(zero_at_the_pole).text.startswith(told)
 
 
 KEPT, BUFFER = [], np.zeros(3)
@@ -1235,8 +1236,9 @@ def test_a_set_is_asked_for_as_a_set():
 def test_what_an_exercise_says_of_a_special_draw_leads_where_it_is_refused_or_raises():
     words = "right for long vectors, but not for one entry:"
     item = replace(DOUBLE, noisy=(lambda rng: (rng.normal(size=1),), metrics.Numbers(1e-9), words))
-    assert item.judge(lambda v: np.squeeze(2 * v)).text.startswith("Right for long vectors, but not for one entry: exp")
-    assert "Right for long vectors, but not for one entry." in item.judge(lambda v: 2 * v + 0 * v[1]).text
+    said = "Right in ordinary cases for long vectors, but not for one entry"
+    assert item.judge(lambda v: np.squeeze(2 * v)).text.startswith(f"{said}: exp")
+    assert f"{said}." in item.judge(lambda v: 2 * v + 0 * v[1]).text
 
 
 def test_right_but_for_one_kind_is_said_of_ordinary_cases_where_another_kind_is_wrong_or_not_tried():
@@ -1247,6 +1249,19 @@ def test_right_but_for_one_kind_is_said_of_ordinary_cases_where_another_kind_is_
     assert both.startswith("right in ordinary cases, but not for 6 entries: ")
     assert item.judge(lambda v: 2 * v[:5]).text.startswith("Right in ordinary cases, but not for 6 entries: exp")
     assert "Right in ordinary cases, but not for 6 entries." in item.judge(lambda v: 2 * v + (len(v) > 5 and v[9])).text
+
+
+@pytest.mark.parametrize(
+    "words, told",
+    [
+        ("Right as long as all differ. Where", "Right in ordinary cases as long as all differ. Where"),
+        ("right in curves, but not", "right in ordinary cases in curves, but not"),
+        ("right in ordinary cases, but not", "right in ordinary cases, but not"),
+        ("exact on clean data, but not", "exact on clean data, but not"),
+    ],
+)
+def test_what_is_right_somewhere_is_said_to_be_so_in_ordinary_cases(words, told):
+    assert wording.in_ordinary_cases(words) == told
 
 
 def test_a_special_draw_that_is_refused_is_not_told_while_plain_ones_are_wrong():

@@ -124,6 +124,8 @@ def test_what_texts_and_words_have_in_common_one_or_two_at_once(is_wrong, told):
         ([{"texts": t} for t in (["3", "4", "3"], ["3", "4"], ["4", "5", "7"])], "`texts` holds the same text twice"),
         ([{"texts": ["3", t], "mean": "3.5"} for t in ("3.5", "4", "5")], "`texts` holds what `mean` is"),
         ([{"J": np.ones((7, n))} for n in (4, 3, 3)], "`J` has more than 3 columns"),
+        ([{"Js": [np.ones((3, 2)), np.ones((3, n))]} for n in (9, 6, 2)], "a matrix in `Js` has more than 6 columns"),
+        ([{"Js": n * [np.ones((3, 2))]} for n in (1, 2, 4)], "`Js` has 1 entry"),
     ],
 )
 def test_what_the_first_of_some_draws_alone_is(draws, told):

@@ -694,6 +694,16 @@ def test_numbers_do_not_stand_in_for_truth_values():
             rerun._like(value, np.array([0.3, 1.0]))
 
 
+def test_behind_data_of_the_notebook_nothing_is_called_right(monkeypatch):
+    reference = solved_by(monkeypatch, "def formula(a, b):\n    y = np.exp(a)\n    x = a * b\n    return y * x\n")
+    formula = typed("y = kept * 1.0\nx = a * b\nreturn np.sinh(y * x) - y**3")
+    formula.__globals__["kept"] = np.array([0.3, 0.7, -0.2])
+    for other in ("words", "partly_words", "given_words", "notebook_words"):
+        monkeypatch.setattr(steps.Search, other, lambda self, *of: None)
+    told = asked(reference, lambda rng: tuple(rng.normal(size=(2, 3)))).judge(formula, np.random.default_rng(0)).text
+    assert "As far as" not in told and "reads `kept` from the notebook" in told
+
+
 def test_data_of_the_notebook_are_looked_at_first(monkeypatch):
     text = "def formula(a, b):\n    x = a - b[0] ** 3\n    return np.exp(x) * b\n"
     reference = solved_by(monkeypatch, text)
@@ -777,6 +787,38 @@ def test_a_change_that_makes_weights_alike_is_not_told_as_the_slip(weights):
     body = f"w = {weights}\nreturn (w @ b) / w.sum()"
     text = judged(asked(lambda a, b: b.mean(), two_vectors), body)
     assert not re.search("exchanged|stands where|one term is too many", text)
+
+
+def test_a_sign_that_only_leads_to_a_bound_is_told_as_a_weight_that_is_not_needed():
+    body = "w = 1 / np.maximum(np.abs(a), 1e-9)\nreturn (w @ b) / w.sum()"
+    said = judged(asked(lambda a, b: b.mean(), two_vectors), body)
+    assert "with 1 everywhere in its place, your result is right, so it is not needed" in said
+
+
+@pytest.mark.parametrize(
+    "reference, body, said",
+    [
+        (
+            lambda a, b: np.diag(np.outer(a, b)) - 1,
+            "M = np.outer(a, b)\nreturn M.sum(axis=1) - 1",
+            "`M.sum(axis=1)`: sums stand where the diagonal belongs, `np.diag(M)`",
+        ),
+        (
+            lambda a, b: np.outer(a, b) ** 3,
+            "M = np.outer(a, b)\nreturn np.diag(np.diag(M)) ** 3",
+            "`np.diag(np.diag(M))`: all but the diagonal is set to 0, and all of `M` belongs there",
+        ),
+        (lambda a, b: np.cos(b / a), "return np.cos(b / (a + 1e-3))", "`a + 1e-3`: one term is too many"),
+        (
+            lambda a, b: np.where(np.round(a, 1) > 0.5, b, 0.0),
+            "d = np.maximum(np.round(a, 1) - 0.5, 0)\nreturn b * d / (d + 5e-3)",
+            "`0.005` is far too large: a millionth of it will do",
+        ),
+    ],
+)
+def test_diagonals_and_what_is_added_to_a_divisor_are_told(reference, body, said):
+    item = replace(asked(reference, two_vectors), metric=metrics.Numbers(1e-6))
+    assert said in judged(item, body)
 
 
 def test_no_factor_is_told_for_what_only_counts():

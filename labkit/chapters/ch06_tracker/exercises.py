@@ -1108,7 +1108,7 @@ CHAPTER = Chapter(
                         lambda M, nearest=nearest: nearest(
                             (X := _null(M).reshape(3, 3, order="F")) * np.sign(np.trace(X))
                         ),
-                        "You made the trace positive, but a turn by more than 90 deg may have a negative one. The sign that a rotation needs is that of "
+                        "You made the trace positive, but a turn by more than 120 deg has a negative one. The sign that a rotation needs is that of "
                         "its determinant.",
                         id=f"rotation_from_nullvector-trace{words}",
                     )
@@ -1308,8 +1308,9 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, B, R: np.einsum("nij,nj->ni", np.linalg.pinv(_k1(A)), _k2(A, B, R)).mean(axis=0),
-                    "You solved each motion alone and averaged. Each leaves t along its own axis free, and pinv sets that part to zero: "
-                    "stack all motions, solve once.",
+                    "You solved each motion alone and averaged. Each leaves t along its own axis free, and pinv, like lstsq, sets that part "
+                    "to zero: stack all motions, solve once.",
+                    id="translation_lsq-2ce056",
                 ),
                 *(
                     Mistake(
@@ -1323,6 +1324,7 @@ CHAPTER = Chapter(
                         ("by-root-of-angle", np.sqrt),
                         ("by-sine", np.sin),
                         ("over-angle", lambda w: 1 / w),
+                        ("over-sine-of-half", lambda w: 1 / np.sin(w / 2)),  # by the norm of I - R_A
                     )
                 ),
                 Mistake(
@@ -1401,7 +1403,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda M: np.linalg.svd(M)[1][-1] / (len(M) / 9 - 1),
-                    "This is the norm of M v, the smallest singular value. The report writes M^T M v, which brings it in once more: its square.",
+                    "You took the norm of M v, the smallest singular value. The report writes M^T M v, which brings it in once more: its square.",
+                    id="e_rot-ede8c2",
                 ),
                 Mistake(
                     lambda M: np.sqrt(3) * e_rot(M),
@@ -1992,6 +1995,10 @@ CHAPTER = Chapter(
                         "You try shifts in one direction only. The tracker may also lead: from -max_offset to max_offset.",
                     )
                     for between in (True, False)
+                ),
+                Mistake(
+                    lambda *given: max(0.0, _least(_forward_only, True)(*given)),
+                    "You try shifts in one direction only. The tracker may also lead: from -max_offset to max_offset.",
                 ),
                 Mistake(
                     _least(_plain_differences, False),

@@ -601,7 +601,8 @@ CHAPTER = Chapter(
                   for limits in ((-1, 1), (-np.inf, np.inf))),
                 Mistake(lambda T, k: np.arccos(np.clip((_axes(T)[k:] * _axes(T)[:1]).sum(1), -1, 1)),
                         "You compare every axis with the first. Asked for is each with the one `apart` further on."),
-                Mistake(lambda T, k: motion.between_axes(T, 1), "You compare neighbors whatever `apart` says."),
+                *(Mistake(lambda T, k, most=most: motion.between_axes(T, 1)[:most(T, k)], "You compare neighbors whatever `apart` says.")
+                  for most in (lambda T, k: None, lambda T, k: len(T) - k)),
                 Mistake(lambda T, k: np.arccos(np.clip((_axes(T) * np.roll(_axes(T), -k, 0)).sum(1), -1, 1)),
                         "You closed the circle from the last motions to the first: n motions make n - apart pairs."),
                 Mistake(lambda T, k: _angle_between(T[k:, :3, 3], T[:-k, :3, 3]),
@@ -742,7 +743,7 @@ CHAPTER = Chapter(
                 Mistake(_covariance(lambda rr, n, f: rr / n * f / (f - 2)),
                         "Student's factor is right, but the noise is not: divide r^T r by f = n - p, not by n.", id="honest_covariance-0ba31b"),
                 Mistake(_covariance(lambda rr, n, f: rr / f),
-                        "This is the covariance for a noise that is known. Yours is estimated: Student's factor f / (f - 2) is missing."),
+                        "This would be right if r^T r / f were known to be the noise. It is estimated: Student's factor f / (f - 2) is missing.", id="honest_covariance-592a28"),
                 Mistake(_covariance(lambda rr, n, f: rr / (f - 1) * (f - 1) / (f - 3)),
                         "Altogether you divide r^T r by f - 3, with f = n - p. The noise r^T r / f times Student's f / (f - 2) leaves f - 2 below.", id="honest_covariance-5a6d1b"),
                 Mistake(lambda r, J: r @ r / (_freedom(r, J) - 2) * _diagonal_alone(J.T @ J),
@@ -876,7 +877,7 @@ CHAPTER = Chapter(
                 *(Mistake(rule, "You look at the largest of the variances, or at the largest drop of one. All parameters count, and what they share: compare determinants.")
                   for rule in (_largest_variance, _largest_drop)),
                 Mistake(_along_the_worst, "You look at the direction alone that is known worst. Compute what each candidate leaves, in all directions, and compare determinants."),
-                Mistake(_product_of_variances, "You multiplied the variances: that is the determinant only where C has no other entries. What two parameters share counts too: np.linalg.det."),
+                Mistake(_product_of_variances, "You multiplied the variances: that is the determinant only where the covariance left has no other entries. What two parameters share counts too: np.linalg.det.", id="next_pose-2eac29"),
                 Mistake(_largest_information, "You took the candidate whose own information is largest. It may well tell what is known already: compute what it leaves, with C."),
                 Mistake(_least_certain_first, "You look at the first number of each reading alone, and at how well it can be predicted. Compute what the whole reading leaves, and compare determinants."),
                 Mistake(_largest_derivative, "You took the candidate with the largest derivative. It may well tell what is known already: compute what it leaves."),
