@@ -85,13 +85,17 @@ class _Capture(io.TextIOBase):
     """Standard output that keeps the first characters and counts the rest."""
 
     def __init__(self):
-        self.text, self.lost = "", 0
+        self.text, self.lost, self.room = "", 0, OUTPUT_LIMIT
 
     def write(self, text):
-        room = OUTPUT_LIMIT - len(self.text)
-        self.text += text[:room]
-        self.lost += max(0, len(text) - room)
-        return len(text)
+        size = len(text)
+        if self.room:
+            kept = text[: self.room]
+            self.text += kept
+            self.room -= len(kept)
+            self.lost -= len(kept)
+        self.lost += size
+        return size
 
     def value(self):
         more = f"\n... and {self.lost} more characters" if self.lost else ""

@@ -151,7 +151,7 @@ export class Renderer {
     const { gl } = this;
     this.lost = false;
     this.smooth = null;
-    this.shades = false; // a processor that draws has its first picture sooner without: the first smooth one brings the shadow
+    this.whole = false; // a processor that draws has its first picture sooner without shadow and what shines through: the first smooth one brings both
     this.age = (this.age ?? 0) + 1; // whoever holds buffers makes them anew when it has changed
     this.solid = createProgramInfo(gl, [SOLID_VERTEX, SOLID_FRAGMENT]);
     this.cast = createProgramInfo(gl, [CAST_VERTEX, CAST_FRAGMENT]);
@@ -323,8 +323,8 @@ export class Renderer {
   draw(width, height, lens, { solids, lines, points, floor, shadow, wide }, smooth, quick) {
     const { gl, canvas } = this;
     const fall = [floor ?? 0, 0, 1 / (SHADOWED * wide)];
-    this.shades ||= smooth;
-    const shaded = this.shades && solids && shadow && floor !== null;
+    this.whole ||= smooth;
+    const shaded = this.whole && solids && shadow && floor !== null;
     if (shaded && !solids.cast) this.castShadow(solids, fall);
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     const frame = smooth ? this.smoothTarget(width, height) : null;
@@ -350,7 +350,7 @@ export class Renderer {
       this.drawPart(seen.opaque, seen.indices.length);
     }
     gl.depthFunc(gl.GREATER); // what lies behind a body shines through a little
-    this.drawPaths(lines, quick ? null : points, common, 0.22);
+    if (this.whole) this.drawPaths(lines, quick ? null : points, common, 0.22);
     gl.bindVertexArray(null);
     if (!frame) return;
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, frame);
