@@ -20,3 +20,12 @@ def address():
     as_root = hasattr(os, "geteuid") and os.geteuid() == 0
     with driver.server([*words, *(["--allow-root"] if as_root else [])]) as found:
         yield found
+
+
+@pytest.fixture(scope="session")
+def lab(address):
+    """A page with the JupyterLab as it opens; whoever uses it opens a notebook in place of the one in front."""
+    with driver.page_of(driver.find_browser()) as page:
+        page.goto(address)
+        driver.wait_until_idle(page)
+        yield page

@@ -161,6 +161,20 @@ def open_notebook(page, address, path):
     wait_until_idle(page)
 
 
+def open_instead(page, path):
+    """Open a notebook in place of the one in front, in which nothing was changed, and wait until its kernel is idle."""
+    page.evaluate(
+        """(path) => {
+            const { commands, shell } = window.jupyterapp;
+            shell.currentWidget.dispose();
+            commands.execute("docmanager:open", { path });
+        }""",
+        path,
+    )
+    page.wait_for_function("(path) => window.jupyterapp.shell.currentWidget?.context?.path === path", arg=path)
+    wait_until_idle(page)
+
+
 def wait_until_idle(page, seconds=120):
     """Until the status bar says that the kernel is idle, for a second and a half."""
     page.wait_for_selector(".jp-Notebook:visible .jp-Cell", timeout=60_000)

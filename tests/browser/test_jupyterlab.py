@@ -25,20 +25,17 @@ def notebook():
 
 
 @pytest.fixture(scope="module")
-def page(address):
-    with driver.page_of(driver.find_browser()) as page:
-        yield page
+def page(lab):
+    return lab
 
 
-def test_the_first_notebook_opens_and_nothing_is_asked(page, address):
-    page.goto(address)
-    driver.wait_until_idle(page)
+def test_the_first_notebook_opens_and_nothing_is_asked(page):
     page.get_by_role("heading", name="start here").wait_for(timeout=30_000)
     assert page.locator(".jp-Dialog, .Toastify__toast").count() == 0
 
 
-def test_chapter_1_runs_to_its_end_unsolved(page, address, notebook):
-    driver.open_notebook(page, address, notebook)
+def test_chapter_1_runs_to_its_end_unsolved(page, notebook):
+    driver.open_instead(page, notebook)
     driver.run_all(page)
     errors = page.locator(".jp-Notebook:visible [data-mime-type='application/vnd.jupyter.stderr']").all_inner_texts()
     assert not errors

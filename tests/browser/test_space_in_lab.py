@@ -44,12 +44,12 @@ def apart(one, other):
 
 
 @pytest.fixture(scope="module")
-def page(address):
-    with driver.notebook_of(*CELLS) as copy, driver.page_of(driver.find_browser()) as page:
-        driver.open_notebook(page, address, copy)
-        driver.run_all(page)
-        driver.show_notebook_alone(page)
-        yield page
+def page(lab):
+    with driver.notebook_of(*CELLS) as copy:
+        driver.open_instead(lab, copy)
+        driver.run_all(lab)
+        driver.show_notebook_alone(lab)
+        yield lab
 
 
 def at_rest(page, number):

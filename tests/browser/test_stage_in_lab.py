@@ -36,17 +36,16 @@ def notebook():
 
 
 @pytest.fixture(scope="module")
-def page(address, notebook):
-    with driver.page_of(driver.find_browser()) as page:
-        driver.open_notebook(page, address, notebook)
-        page.untouched = driver.save(page, notebook)
-        driver.run_all(page)
-        page.locator(".jp-OutputArea-output button", has_text="it does not move").click()
-        page.locator(".labkit-stage[data-picture]").nth(POINTS).wait_for(timeout=20_000)
-        page.wait_for_timeout(1000)
-        page.answered = page.evaluate(ANSWERED, POINTS)
-        driver.show_notebook_alone(page)
-        yield page
+def page(lab, notebook):
+    driver.open_instead(lab, notebook)
+    lab.untouched = driver.save(lab, notebook)
+    driver.run_all(lab)
+    lab.locator(".jp-OutputArea-output button", has_text="it does not move").click()
+    lab.locator(".labkit-stage[data-picture]").nth(POINTS).wait_for(timeout=20_000)
+    lab.wait_for_timeout(1000)
+    lab.answered = lab.evaluate(ANSWERED, POINTS)
+    driver.show_notebook_alone(lab)
+    return lab
 
 
 def figure(page, number):
