@@ -2977,11 +2977,11 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda a, w: math.atan2((w * np.sin(a)).sum(), np.cos(a).sum()), "The cosines have no weights."
                 ),
-                Mistake(lambda a, w: math.atan2(np.sin(a).sum(), (w * np.cos(a)).sum()), "The sines have no weights."),
                 Mistake(
                     lambda a, w: math.atan2(np.average(np.sin(a), weights=w), np.cos(a).mean()),
                     "The cosines have no weights.",
                 ),
+                Mistake(lambda a, w: math.atan2(np.sin(a).sum(), (w * np.cos(a)).sum()), "The sines have no weights."),
                 Mistake(
                     lambda a, w: math.atan2(np.sin(a).mean(), np.average(np.cos(a), weights=w)),
                     "The sines have no weights.",
