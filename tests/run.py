@@ -5,7 +5,7 @@
     python lab.py test --last-bits 1              unit tests and solved notebooks, the last bits of what linear algebra
                                                   returns stirred (`last_bits.py`); also before names
 
-Unit tests, solved notebooks (strict) and blank notebooks (lax) are dealt out to a few pytest processes, two more at a
+Unit tests, solved notebooks (strict) and blank notebooks (lax) are dealt out to a few pytest processes, one more at a
 time than there are processors, since browsers, kernels and judges of a class wait for each other. The last line is the
 sum, "N passed, N failed"; the exit code is 1 if anything failed.
 
@@ -52,7 +52,7 @@ def main(arguments):
         seeds = stirred_jobs(jobs, seed)
         jobs = {name: words for name, words in jobs.items() if seed is None or name in seeds}
         total = dict.fromkeys(COUNTED, 0)
-        places = 2 + max(2, os.cpu_count() or 2) if len(jobs) > 1 else 1
+        places = 1 + max(2, os.cpu_count() or 2) if len(jobs) > 1 else 1
         with ThreadPoolExecutor(places) as pool, ThreadPoolExecutor(1) as beside:
             running = {
                 (beside if name == WAITING else pool).submit(run, words, seeds.get(name), name != FIRST): name
