@@ -29,7 +29,7 @@ from labkit.verbs import build
 
 ROOT = source.ROOT
 SECONDS_A_JOB = 900
-UNITS = 8  # jobs of unit tests beside the longest: none is left alone on one processor at the end
+UNITS = 4  # jobs of unit tests beside the longest: each costs three seconds before its first test
 LONGEST = ROOT / "tests" / "chapters" / "test_exercises.py"  # a job of its own, begun among the first
 APART = ("browser", "hub", "collect")  # folders of tests that are jobs of their own: they wait for other processes
 FIRST = "browser"  # the longest: it has a processor whenever it wants one

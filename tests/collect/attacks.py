@@ -101,7 +101,7 @@ BY_CELL = {  # whole cells
     "kills itself": "import os, signal\nos.kill(os.getpid(), signal.SIGKILL)",
     "forks": "import os\nif os.fork() == 0:\n    open('{secret}', 'w').write('x')\n    os._exit(0)",
     "memory": "x = bytearray(50 << 30)\ninvert = ex.invert(lambda T: T)",
-    "memory, bit by bit": "x = [bytearray(1 << 20) for _ in range(100000)]\ninvert = ex.invert(lambda T: T)",
+    "memory, bit by bit": "x = [np.empty(1 << 17) for _ in range(100000)]\ninvert = ex.invert(lambda T: T)",
     "output": "import os\nfor _ in range(2000):\n    print('x' * 100000)\n    os.write(1, b'x' * 100000)",
     "writes a file": "open('{secret}', 'w').write('x')",
     "writes by the shell": "!touch {secret}\nimport os, subprocess\nos.system('touch {secret}')",
