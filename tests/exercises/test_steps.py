@@ -653,22 +653,19 @@ def test_what_agrees_ends_at_the_first_step_that_does_not(monkeypatch):
     assert "As far as `x` (line 2) your values are those of the solution; `y = np.sin(a)" in text
 
 
-def test_what_is_changed_further_down_is_not_called_right(monkeypatch):
+@pytest.mark.parametrize(
+    "body",
+    [
+        "x = a * b\nx[1:] = np.sinh(b[:2])\ny = np.tan(x) - 3 * a\nreturn y[0] ** 3 + x[1] * y[2]",
+        "x = a * b\nif x[0] > 0:\n    x = np.sinh(b)\ny = np.tan(x) - 3 * a\nreturn y[0] ** 3 + y[2]",
+    ],
+    ids=["further down", "on some draws"],
+)
+def test_what_is_changed_or_bound_again_is_not_called_right(monkeypatch, body):
     reference = solved_by(monkeypatch, "def formula(a, b):\n    x = a * b\n    y = np.exp(x)\n    return y[0] + x[1]\n")
-    item = asked(reference, lambda rng: tuple(rng.normal(size=(2, 3))))
     for other in ("words", "partly_words", "given_words"):
         monkeypatch.setattr(steps.Search, other, lambda self, *of: None)
-    told = judged(item, "x = a * b\nx[1:] = np.sinh(b[:2])\ny = np.tan(x) - 3 * a\nreturn y[0] ** 3 + x[1] * y[2]")
-    assert "`x`" not in told
-
-
-def test_what_is_bound_again_on_some_draws_is_not_called_right(monkeypatch):
-    reference = solved_by(monkeypatch, "def formula(a, b):\n    x = a * b\n    y = np.exp(x)\n    return y[0] + x[1]\n")
-    item = asked(reference, lambda rng: tuple(rng.normal(size=(2, 3))))
-    for other in ("words", "partly_words", "given_words"):
-        monkeypatch.setattr(steps.Search, other, lambda self, *of: None)
-    told = judged(item, "x = a * b\nif x[0] > 0:\n    x = np.sinh(b)\ny = np.tan(x) - 3 * a\nreturn y[0] ** 3 + y[2]")
-    assert "`x`" not in told
+    assert "`x`" not in judged(asked(reference, lambda rng: tuple(rng.normal(size=(2, 3)))), body)
 
 
 def test_what_was_given_infinite_is_not_what_went_wrong():
