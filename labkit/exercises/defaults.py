@@ -90,4 +90,4 @@ def _is_still(before, now):
         return False
     if isinstance(before, set):
         return before == now
-    return guard._same(before, now) if isinstance(before, COMPARED) else before is now
+    return guard.is_same(before, now) if isinstance(before, COMPARED) else before is now

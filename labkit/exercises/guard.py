@@ -142,6 +142,7 @@ class Pristine:
                 self.seen[name] = tuple(vars(owner).values())
 
     def _look_through(self, name, owner, then, size):
+        """The same name by name, for one module or class."""
         now = vars(owner)
         if not all(map(operator.is_, map(now.get, then, itertools.repeat(self)), then.values())):
             self._put_back(name, owner, now, then)
@@ -489,7 +490,7 @@ def _run_once(function, args, finish, limit, author):
     outcome.printed = capture.value()
     PRISTINE.restore()
     if outcome.error is None:
-        outcome.changed = [k for k, (a, b) in enumerate(zip(args, given)) if not _same(a, b)]
+        outcome.changed = [k for k, (a, b) in enumerate(zip(args, given)) if not is_same(a, b)]
     return outcome
 
 
@@ -509,14 +510,14 @@ def _one_line(text):
     return " ".join(line.strip() for line in text.splitlines() if line.strip())
 
 
-def _same(before, after):
+def is_same(before, after):
     """Whether an argument is what it was; only data count, a random generator may move on."""
     if isinstance(before, np.ndarray):
         return before.shape == np.shape(after) and np.array_equal(before, after, equal_nan=before.dtype.kind in "fc")
     if isinstance(before, list | tuple):
-        return len(before) == len(after) and all(map(_same, before, after))
+        return len(before) == len(after) and all(map(is_same, before, after))
     if isinstance(before, dict):
-        return before.keys() == after.keys() and all(_same(before[k], after[k]) for k in before)
+        return before.keys() == after.keys() and all(is_same(before[k], after[k]) for k in before)
     if isinstance(before, str | int | float | np.number):
         return type(before) is type(after) and (before == after or before != before and after != after)
     return True

@@ -1224,7 +1224,7 @@ def test_a_list_of_texts_or_numbers_that_is_changed_is_told():
         hints=("a", "b", "c"),
     )
     assert "changes its argument `texts` in place" in item.judge(changes).text
-    assert not guard._same([1.0, 2], [1.0, 3]) and guard._same([np.nan, "a"], [np.nan, "a"])
+    assert not guard.is_same([1.0, 2], [1.0, 3]) and guard.is_same([np.nan, "a"], [np.nan, "a"])
 
 
 def test_a_set_is_asked_for_as_a_set():

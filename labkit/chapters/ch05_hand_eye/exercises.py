@@ -71,12 +71,8 @@ def just_enough(rng):
 
 
 MANY = 120  # more poses than the thesis's 31
-COUNTS = (
-    None,
-    1,
-    MANY,
-    3,
-)  # some ten, one row, many, and as many rows as columns: which of them are which is asked there
+# some ten rows, one, many, and as many as columns: which of them are which is asked there
+COUNTS = (None, 1, MANY, 3)
 
 
 def kuka_scene(rng, n=None):
