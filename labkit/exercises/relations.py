@@ -10,7 +10,7 @@ import numpy as np
 
 from ..geometry import frames
 from ..geometry.lie import log_so3
-from .metrics import Exactly, Numbers, Poses, Rotations, Several, Through
+from .metrics import Angles, Exactly, Numbers, Poses, Rotations, Several, Through
 
 CLOSE = 1e4  # tolerances: an answer nearer than this is right in kind, but not accurate enough ...
 FAR = 1e-2  # ... unless it is off by more than this: a coarse tolerance leaves no room for less accurate answers
@@ -75,7 +75,7 @@ def _relation(metric, results, expected, sizes, whole):
         return _rotation_relation(results, holds, whole)
     unit = getattr(metric, "unit", "")
     words = (
-        _sign_or_unit(holds, unit)
+        _sign_or_unit(holds, "rad" if isinstance(metric, Angles) else unit)
         or _without_sign(metric, results, expected)
         or _arrangement(results, holds)
         or _power(results, holds)
@@ -172,20 +172,28 @@ def _axes(order, signs):
 def _sign_or_unit(holds, unit):
     if holds(np.negative):
         return "your result is right up to its sign"
-    if unit not in ("", "deg", "rad", "deg/s", "rad/s") and (holds(np.deg2rad) or holds(np.rad2deg)):
-        factor = "180/pi" if holds(np.deg2rad) else "pi/180"
-        return (
-            f"your result is {factor} times the expected one: is an angle in it in the wrong unit, or converted twice?"
-        )
     if holds(np.deg2rad):
-        once_too_often = "your result has been converted to degrees once too often"
-        return once_too_often if unit == "deg" else "your result is in degrees where radians are expected"
+        return _turned_unit("180/pi", unit.partition("/")[0], "deg", "rad")
     if holds(np.rad2deg):
-        return "your result is in radians where degrees are expected"
+        return _turned_unit("pi/180", unit.partition("/")[0], "rad", "deg")
     for factor, words in ((1e3, "a thousandth of"), (1e-3, "a thousand times"), (0.5, "twice"), (2.0, "half")):
         if holds(lambda r, factor=factor: factor * r):
             return f"your result is {words} the expected one{_thousand(unit) if factor in (1e3, 1e-3) else ''}"
     return None
+
+
+def _turned_unit(factor, unit, into, other):
+    """What is said of a result that is as if converted `into` one unit of angles, where it is expected in `unit`."""
+    words = {"deg": "degrees", "rad": "radians"}
+    if unit == other:
+        return f"your result is in {words[into]} where {words[other]} are expected"
+    if unit == into:
+        return f"your result is as if converted to {words[into]} once too often"
+    if unit:
+        return (
+            f"your result is {factor} times the expected one: is an angle in it in the wrong unit, or converted twice?"
+        )
+    return f"your result is {factor} times the expected one, as if it were converted to {words[into]}"
 
 
 def _without_sign(metric, results, expected):

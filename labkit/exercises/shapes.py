@@ -127,17 +127,22 @@ def _less():
     yield "the roots of the expected matrix' diagonal", lambda e: np.sqrt(np.diag(_square(e)))
     yield "a matrix with the expected numbers on its diagonal", lambda e: np.diag(_vector(e))
     yield from _digests("the expected numbers")
-    yield "the expected result without its last row", lambda e: _long(e)[:-1]
-    yield "the expected result without its first row", lambda e: _long(e)[1:]
+    yield "the expected result without its last row or entry", lambda e: _long(e)[:-1]
+    yield "the expected result without its first row or entry", lambda e: _long(e)[1:]
     yield "every second of the expected numbers or rows", lambda e: _long(e, 2)[::2]
     for k in range(1, MOST + 1):
-        yield f"the first {k} of the expected numbers or rows alone", lambda e, k=k: _long(e, k)[:k]
+        yield f"the {_first(k)} of the expected numbers or rows alone", lambda e, k=k: _long(e, k)[:k]
         yield f"the top left {k} by {k} block of the expected matrix", lambda e, k=k: _square(e, k)[:k, :k]
     for k in range(MOST):
         yield f"row {k} (counted from 0) of the expected result alone", lambda e, k=k: _table(e)[k]
         yield f"column {k} (counted from 0) of the expected result alone", lambda e, k=k: _table(e)[:, k]
         yield f"entry {k} (counted from 0) of the expected result alone", lambda e, k=k: _vector(e)[k]
-        yield f"the first {k} columns of the expected result alone", lambda e, k=k: _table(e)[:, : max(k, 1)]
+        yield f"the {_first(k + 1, 'columns')} of the expected result alone", lambda e, k=k: _table(e)[:, : k + 1]
+
+
+def _first(k, several=""):
+    """The first k of several, in words."""
+    return " ".join(filter(None, ("first", str(k) * (k > 1), several if k > 1 else several[:-1])))
 
 
 def _more(rows):
@@ -148,8 +153,8 @@ def _more(rows):
         "of the other, as `np.dot` gives them: `@` takes the two that stand in the same place",
         _stack_of_own,
     )
-    yield "your result has one row too many, the last; the others are right", lambda r: _long(r)[:-1]
-    yield "your result has one row too many, the first; the others are right", lambda r: _long(r)[1:]
+    yield "your result has one row or entry too many, the last; the others are right", lambda r: _long(r)[:-1]
+    yield "your result has one row or entry too many, the first; the others are right", lambda r: _long(r)[1:]
     if rows > MOST:
         yield "the expected result is the last entry or row of what you return", lambda r: r[-1]
     for k in range(min(rows, MOST)):

@@ -12,6 +12,7 @@ from .results import Refusal, admitted_by, could_change, is_another, numbers_of,
 REPEATING = 0.02  # seconds of processor time in which an answer that came out right is called again
 IN_A_ROW = 8  # times that a draw is called then, of each of ...
 ALIKE = 3  # kinds of results at most, where they are words or truth values
+UNFILLED = {"empty", "empty_like"}  # what makes arrays that hold whatever stood there before
 
 
 class Staying(Evidence):
@@ -68,6 +69,8 @@ class Staying(Evidence):
         cause = "Does something stay from call to call, a global variable or a default argument that is changed?"
         if names := self.defaults.changed_names:
             cause = f"It leaves {names} changed for the next call: does the result follow from that?"
+        if UNFILLED & set(getattr(getattr(self.function, "__code__", None), "co_names", ())):
+            cause = f"Is each entry of what `np.empty` makes filled? {cause}"
         told = f"called {often} with the same arguments, your function {told} {at}"
         return f"{told}. {cause} Or is something drawn at random?"
 

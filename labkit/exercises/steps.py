@@ -339,7 +339,7 @@ class Search:
             nought = "zeros" if any(values[k][1].ndim > 1 for values in self.values) else "0"
             there = "on the right side" if self._binds(k) else "in its place"
             return f"{self._where(k)}: with {nought} {there}, your result is right. {NOT_NEEDED}"
-        name = "" if other is None else self._bound(other) if kind == "own" else f"`{self.names[other]}`"
+        name = "" if other is None else self._bound(other) if kind == "own" else self._given_name(k, other)
         words = rerun.OTHERWISE[change][0].format(name)
         words = rerun.OF_TRUTHS.get(words, words) if k in self.written.of_truth else words
         words = rerun.OF_ARRAYS.get(words, words) if any(values[k][1].ndim > 1 for values in self.values) else words
@@ -350,6 +350,12 @@ class Search:
         """A variable by its name; `_`, which may be bound anew in every line, with its line."""
         line, _, name, *_ = self.written.places[k]
         return f"`{name}` of line {line}" if name == "_" else f"`{name}`"
+
+    def _given_name(self, k, argument):
+        """An argument by its name, which stands for another value where it has been bound anew before."""
+        name = self.names[argument]
+        anew = (code for _, code, bound, *_ in self.written.places[:k] if bound == name and code != name)
+        return f"`{name}` as it was given" if any(anew) else f"`{name}`"
 
     def _argument_words(self):
         """What is to be done with an argument before the first line, as it is read in several places."""

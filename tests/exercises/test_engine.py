@@ -320,8 +320,8 @@ def test_seeding_numpy_does_not_fix_the_draws():
         (lambda v: 2000 * v, "a thousand times the expected one: mm against m?"),
         (lambda v: 4 * v, "twice the expected one"),
         (lambda v: v, "half the expected one"),
-        (lambda v: np.rad2deg(2 * v), "in degrees where radians are expected"),
-        (lambda v: np.deg2rad(2 * v), "in radians where degrees are expected"),
+        (lambda v: np.rad2deg(2 * v), "180/pi times the expected one, as if it were converted to degrees"),
+        (lambda v: np.deg2rad(2 * v), "pi/180 times the expected one, as if it were converted to radians"),
         (lambda v: 2 * v[::-1], "in reverse order"),
         (lambda v: 6.2 * v, "3.1 times the expected one"),
         (lambda v: 6 * v, "3 times the expected one, on every draw: a sum where a mean is meant?"),
@@ -428,9 +428,13 @@ def test_a_near_wrong_value_is_told_from_a_rounded_right_one():
 
 
 def test_degrees_converted_twice_are_not_told_to_be_radians():
-    angle = Value("angle", reference=lambda: 2.5, unit="deg", hints=("a", "b", "c"))
-    assert "once too often" in angle.judge(np.rad2deg(2.5)).text
-    assert "in radians where degrees" in angle.judge(np.deg2rad(2.5)).text
+    for unit, other, once_more, once_less in (
+        ("deg", "radians", np.rad2deg, np.deg2rad),
+        ("rad/s", "degrees", np.deg2rad, np.rad2deg),
+    ):
+        angle = Value("angle", reference=lambda: 2.5, unit=unit, hints=("a", "b", "c"))
+        assert "once too often" in angle.judge(once_more(2.5)).text
+        assert f"in {other} where" in angle.judge(once_less(2.5)).text
 
 
 def test_the_rotation_alone_can_be_a_named_mistake_of_a_pose():
@@ -1020,6 +1024,17 @@ def keeps_a_set(v, found={0.5}):  # noqa: B006, the slip in question
 def test_what_stays_in_a_set_between_calls_is_told():
     exercise = replace(DOUBLE, reference=lambda v: {round(v[0], 6)}, metric=metrics.Exactly())
     assert "called twice with the same arg" in exercise.judge(keeps_a_set, rng=np.random.default_rng(0)).text
+
+
+def test_what_is_never_filled_is_asked_for_where_an_empty_array_is_made():
+    calls = itertools.count()
+
+    def left_empty(v):
+        result = np.empty(3)
+        result[:] = next(calls)
+        return result
+
+    assert "Is each entry of what `np.empty` makes filled?" in DOUBLE.judge(left_empty).text
 
 
 @pytest.mark.parametrize("text, told", [("6,25", True), ("-,5", True), ("sign lost, perhaps", False)])

@@ -835,6 +835,17 @@ def test_what_is_bound_to_another_value_is_told_by_the_right_side(before, name):
     assert text.startswith(f"in line 3, `s = np.cos(a * b)`: {name} belongs on the right side. With this alone")
 
 
+def test_an_argument_that_was_bound_anew_before_is_told_as_it_was_given():
+    """By its name alone the changed one would be meant."""
+    text = judged(asked(lambda a, b: np.cos(a) + b, two_numbers), "a = np.floor(a)\na = a + 3\nreturn np.cos(a) + b")
+    assert text.startswith("in line 3, `a = a + 3`: `a` as it was given belongs on the right side. With this alone")
+
+
+def test_the_sum_of_a_vector_is_not_that_of_its_rows():
+    text = judged(asked(lambda a, b: np.exp(a.sum()) + b, two_vectors), "return np.exp(a) + b")
+    assert "in line 2, `a`: its sum belongs there." in text
+
+
 def two_vectors(rng):
     return rng.uniform(0.1, 0.9, 3), rng.normal(size=3)
 
