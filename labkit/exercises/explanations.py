@@ -271,6 +271,8 @@ class Explanations(Named):
             example = example or f"{NOT_RIGHT}{self._call(missed[0][0])}"
         own = isinstance(metric, metrics.Exactly) and type(metric).deviations is not metrics.Exactly.deviations
         words = None if own else cases.result_words(pairs)
+        if 0 < len(missed) < len(pairs) and (axes := relations.turned_axes(metric, [pair for _, *pair in missed])):
+            words = f"{axes} where the result is wrong"
         told = closed(words or str(self._worst([missed[0][1:]]) if example else most))
         if len(missed) == len(pairs):
             side = cases.side_words(pairs)

@@ -320,7 +320,7 @@ class Poses(Metric):
         right = np.isclose(last, (0, 0, 0, 1), atol=1e-6).all(axis=1)
         if not right.all():
             row = last[np.argmin(right)]
-            raise Refused(f"the last row must be 0 0 0 1, got {' '.join(f'{v:.3g}' for v in row)}")
+            raise Refused(f"the last row must be 0 0 0 1, got {' '.join(f'{v + 0.0:.3g}' for v in row)}")
         return result
 
     def deviations(self, result, expected):

@@ -712,6 +712,7 @@ ALIASES = ("with another name where a copy belongs", "with a part where a copy b
 AFRESH = "with a list or array that each round finds as it was"
 COUNTED = "with one index counted from the other end"
 DIVISOR = "with a divisor where a quotient belongs"
+IN_DEGREES = "with one value times 180/pi, as from radians to degrees"
 REVERSED = (  # (words of what was changed in a right formula, what is wrong where the change mends)
     (DIVISOR, "the divisor alone belongs there"),
     (r"with (.+) where (.+) belongs", r"\2 stands where \1 belongs"),
@@ -727,7 +728,7 @@ REVERSED = (  # (words of what was changed in a right formula, what is wrong whe
     (COUNTED, "this index counts from the other end"),
     (r"with one part squared", "the square of this belongs there"),
     (r"with the root of one part taken", "the root of this belongs there"),
-    (r"with one angle in degrees", "this belongs there in degrees"),
+    (IN_DEGREES, "this belongs there in degrees"),
     (r"along another axis in one call", "the axis is another one"),
     (r"with one case treated like the other", "this case needs no treatment of its own"),
     (r"with ([01]) in the place of one part", r"\1 belongs in the place of this"),
@@ -740,7 +741,6 @@ REVERSED = (  # (words of what was changed in a right formula, what is wrong whe
     (WHOLE, "`dtype=float` is missing: an array made of whole numbers alone cuts off decimals"),
     (r"with one round of its loop", "the loop is to take one round only"),
     (r"with one case (never|always) taken", r"this case is to be \1 taken"),
-    (r"with `=` where a value is to be added to", "`+=` stands where `=` belongs"),
 )
 
 
@@ -897,7 +897,7 @@ def _call(node, names):
     yield 2, "with one sign turned", ast.UnaryOp(ast.USub(), node)
     yield 3, "with one part squared", ast.BinOp(node, ast.Pow(), ast.Constant(2))
     yield 3, "with the root of one part taken", _numpy("sqrt", node)
-    yield from [] if name in NO_ANGLES else [(3, "with one angle in degrees", _numpy("rad2deg", node))]
+    yield from [] if name in NO_ANGLES else [(3, IN_DEGREES, _numpy("rad2deg", node))]
 
 
 NO_ANGLES = {"norm", "hypot", "sqrt", "eigvalsh", "eigvals", "det", "median", "trace", "len"}  # what these return
@@ -1012,8 +1012,10 @@ def _instead(statement):
     if isinstance(statement, kinds) and not _is_told(statement):
         yield "without one of its steps", "this step is too many", [ast.Pass()]
     if isinstance(statement, ast.AugAssign):
-        words, mends = "with `=` where a value is to be added to", "`+=` stands where `=` belongs"
-        yield words, mends, [ast.Assign([statement.target], statement.value)]
+        sign = f"`{ast.unparse(statement).removeprefix(ast.unparse(statement.target)).split()[0]}`"
+        mends = f"{sign} keeps what was there before, which does not belong to the result: `=`"
+        mends = mends if isinstance(statement.op, ast.Add) else f"{sign} stands where `=` belongs"
+        yield f"with `=` where {sign} belongs", mends, [ast.Assign([statement.target], statement.value)]
     if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
         copied = ast.Call(ast.Attribute(statement.value, "copy", ast.Load()), [], [])
         name, of = statement.targets[0].id, statement.value

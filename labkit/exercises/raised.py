@@ -72,8 +72,8 @@ class Raised(Explanations):
             return self.outcome(NOT_YET, f"your function cannot be called with ({wanted}): {run.said}.")
         if isinstance(error, NameError) and error.name:
             where = f"\nin {run.line}" if run.line else ""
-            hint = f"`{error.name}` is not known: has the cell that defines it been run since the kernel started?"
-            return self.outcome(RAISED, f"NameError: {hint}{where}")
+            nowhere = "neither where it is read nor in a cell that has been run since the kernel started"
+            return self.outcome(RAISED, f"NameError: `{error.name}` is not known: it is defined {nowhere}.{where}")
         if isinstance(error, RecursionError):
             return self.outcome(RAISED, "RecursionError: your function calls itself without an end.")
         said = run.said or WORDLESS.get(type(error), "" if isinstance(error, AssertionError) else "it says no more")

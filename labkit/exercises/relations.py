@@ -161,6 +161,23 @@ def _rotation_relation(results, holds, whole):
     return None
 
 
+def turned_axes(metric, pairs):
+    """Which axes point the other way in results that are right but for that, in words; None where it is not so."""
+    if not isinstance(metric, Poses | Rotations):
+        return None
+    for signs in itertools.product((1, -1), repeat=3):
+        if all(metric.equal(_with_axes(metric, result, signs), expected) for result, expected in pairs):
+            names = [axis for axis, sign in zip("xyz", signs) if sign < 0]
+            told = " and ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
+            return f"your {told} {'point' if names[1:] else 'points'} the other way"
+    return None
+
+
+def _with_axes(metric, result, signs):
+    """A rotation, or a pose, with its axes turned around where a sign is negative."""
+    return _moved(result, R=result[..., :3, :3] * signs) if isinstance(metric, Poses) else result * signs
+
+
 def _axes(order, signs):
     named = [f"{'-' if s < 0 else ''}{'xyz'[o]}" for o, s in zip(order, signs)]
     return ", ".join(f"{axis} should be your {name}" for axis, name in zip("xyz", named) if axis != name)

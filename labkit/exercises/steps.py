@@ -45,7 +45,7 @@ DECIMALS = re.compile(r"[<>]=? *\d*(\.\d+(e[+-]?\d+)?|e-\d+)$|[<>]=? *\d+e-\d+$"
 FEW_ROUNDS = re.compile(r"these are too few rounds: (\d+) will do")
 GO_ON = "Go on until nothing changes, or choose what needs no rounds"
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
-TURNED = "has the wrong sign"
+TURNED, OTHER_SIGN = "has the wrong sign", "the sign is the other one"
 UNEQUAL = ("where `==` belongs", "where `!=` belongs")  # what computed numbers are never, or always
 TRUTHS = {"`0` belongs": "`False` belongs", "`1` belongs": "`True` belongs"}
 NOT_NEEDED = "What you make of it there does not belong in the result"
@@ -254,7 +254,7 @@ class Search:
         """What a line binds, where a change of it mends only because that is 1 everywhere then, or as good as 1: with
         another sign what a bound keeps above 0 is that bound everywhere.
         """
-        if not mends.endswith((TOO_MANY, "is too much", TURNED, "the sign is the other one")):
+        if not mends.endswith((TOO_MANY, "is too much", TURNED, OTHER_SIGN)):
             return None
         for k, (at, *_) in enumerate(self.written.places):
             if at != line or not self._binds(k) or not all(values[k][0] for values in self.values):
@@ -295,16 +295,17 @@ class Search:
 
     def _left_out_instead(self, number):
         """What says more than a change that mends only because it makes a part do nothing: that a case is never to be
-        met, or always, where what it asks, in its line or before it, is changed otherwise than to a finer bound; that a
-        part is too many, where it has another sign or is made finer; that nothing is to be bounded, where another bound
-        is set.
+        met, or always, where what it asks, in its line or before it, is changed otherwise than to a finer bound, or the
+        sign of what it does; that a part is too many, where it has another sign or is made finer; that nothing is to be
+        bounded, where another bound is set.
         """
         changes = self.written.changes
         line, code, mends = changes[number][1:]
         at_line = [(k, text, words) for k, (_, at, text, words) in enumerate(changes) if at == line]
         finer = mends.endswith("will do")
         around = [(k, words) for k, text, words in at_line if _bare(code) in _bare(text) != _bare(code) and not finer]
-        around += [(k, words) for k, (_, at, _, words) in enumerate(changes) if at > line and not finer]
+        behind = line - 1 if mends == OTHER_SIGN else line  # the case in which a sign is changed stands before it
+        around += [(k, words) for k, (_, at, _, words) in enumerate(changes) if line != at >= behind and not finer]
         case = [k for k, words in around if words.endswith(("never happen", "always happen"))]
         less = [k for k, text, words in at_line if text == code and TOO_MANY in words]
         less += [k for k, text, words in at_line if words.startswith(mutation.STACKED) and _bare(code) in _bare(text)]
@@ -542,6 +543,7 @@ class Search:
                 or self._is_known(k, solution)
                 and not self._is_entry_bound(k)
                 or self._are_rows(k)
+                or self._is_unfilled(k)
             ):
                 continue
             for q in solution.distinct:
@@ -582,6 +584,12 @@ class Search:
     def _are_rows(self, k):
         """Whether a value is, round by round, the rows of the result."""
         return all(r is not None and v[k][0] > 1 and _same(v[k][1], r) for v, r in zip(self.values, self.results))
+
+    def _is_unfilled(self, k):
+        """Whether an array of one number everywhere is made there: to be filled, and it is not what is wrong."""
+        _, code, _, *_ = self.written.places[k]
+        made = (values[k][1] for values in self.values)
+        return _is_fixed(code.rpartition(" = ")[2]) and all(m.ndim > 1 and not np.ptp(m) for m in made)
 
     def _binds(self, k):
         """Whether a value is bound to one name there."""
@@ -781,7 +789,7 @@ class Search:
             return False
         if all(m.shape == (1,) and (m == np.round(m)).all() for m in mine) or not name and _is_listing(code):
             return False  # a count, or several values that are steps of their own
-        return len(mine) > 1 and not _same(mine[0][0], mine[1][0]) and not self._is_given(k)
+        return any(not _same(mine[0][0], other[0]) for other in mine[1:]) and not self._is_given(k)
 
     def _of_right_parts(self, k, solution):
         """Whether the parts of a wrong value are right, so that it is what is done with them."""

@@ -271,6 +271,53 @@ def test_a_refusal_names_the_line(words, status, seed):
     assert judged("read_system", read_system, seed).status == status
 
 
+def minus(T_WA, T_WB):
+    return -np.asarray(np.linalg.solve(T_WA, T_WB))
+
+
+def unfilled(T):
+    out = [[0.0] * 4 for _ in range(4)]
+    for i in range(3):
+        for j in range(3):
+            out[i][3] -= T[j][i] * T[j][3]
+    out[3][3] = 1.0
+    return np.array(out)
+
+
+def signs_alone(a, b):
+    b = np.clip(b, -1, 1)
+    x = np.asarray(a) / np.linalg.norm(a)
+    z = np.cross(a, b)
+    z = z / np.linalg.norm(z)
+    return -np.asarray(np.stack([x, np.cross(z, x), z], axis=1))
+
+
+def no_length(T):
+    R = Rotation.from_matrix(T[:3, :3])
+    return R.magnitude(), np.linalg.norm(T[:0, 3])
+
+
+@pytest.mark.parametrize(
+    "name, answer, told, untrue",
+    [
+        ("relative", minus, "`np.linalg.solve(T_WA, T_WB)`, stands the right result", "a right formula"),
+        ("invert", unfilled, "not orthonormal", "[0.0] * 4"),
+        ("gram_schmidt", signs_alone, "a reflection", "those of the solution"),
+        ("closure_error", no_length, "Your distance is 0 for every T", "You took"),
+        ("chain", lambda transforms: np.zeros((4, 4)), "Every entry is 0", "You started"),
+    ],
+)
+def test_what_is_said_is_true_of_whatever_gives_the_result(name, answer, told, untrue):
+    text = {**FRAMES, **ITEMS}[name].judge(answer, rng=np.random.default_rng(3)).text
+    assert told in text and untrue not in text
+
+
+def test_a_heading_is_told_that_it_needs_a_mark():
+    told = judged("write_system", lambda points: "x y z\n" + beyond.write_system(points)).text
+    assert "A heading needs a # before it" in told
+    assert "heading" not in judged("write_system", lambda points: beyond.write_system(points[:2])).text
+
+
 def test_zeros_are_not_taken_for_the_last_row_alone():
     assert "nothing was filled in" in judged("pivot_rhs", lambda T: np.zeros(3 * len(T))).text
 
@@ -319,6 +366,23 @@ def pole_by_r00(T):
     return xyzabc
 
 
+def pole_from_87_deg(T):
+    R, sign = T[:3, :3], -np.sign(T[2, 0])
+    if abs(R[2, 0]) > 0.999:
+        return np.array([*T[:3, 3], 0.0, sign * np.pi / 2, np.arctan2(sign * R[0, 1], R[1, 1])])
+    A, C = np.arctan2(R[1, 0], R[0, 0]), np.arctan2(R[2, 1], R[2, 2])
+    return np.array([*T[:3, 3], A, -np.arcsin(R[2, 0]), C])
+
+
+def one_sign_of_qr(a, b):
+    Q, _ = np.linalg.qr(np.column_stack([a, b, np.cross(a, b)]))
+    if Q[:, 0] @ a < 0:
+        Q[:, 0] *= -1
+    if np.linalg.det(Q) < 0:
+        Q[:, 1] *= -1
+    return Q
+
+
 library_fit = frames.fit_frame
 
 
@@ -341,6 +405,8 @@ def last_turn_only(xyzabc):
         ("matrix_from_kuka", cosine_by_a_root, "cosine of B is never negative"),
         ("fit_frame", four_points_at_least, ""),
         ("kuka_from_matrix", pole_by_r00, ""),
+        ("kuka_from_matrix", pole_from_87_deg, "but not a degree or two beside one"),
+        ("gram_schmidt", one_sign_of_qr, "your y and z point the other way where the result is wrong"),
     ],
 )
 def test_frames_that_are_right_for_some_only(name, answer, told, seed):
@@ -348,9 +414,11 @@ def test_frames_that_are_right_for_some_only(name, answer, told, seed):
     assert outcome.status == NOT_YET and told in outcome.text
 
 
-def test_an_affine_map_is_no_fit_of_a_frame():
+@pytest.mark.parametrize("centered", [False, True])
+def test_an_affine_map_is_no_fit_of_a_frame(centered):
     def fit(points_F, points_W):
-        affine = np.linalg.lstsq(np.column_stack([points_F, np.ones(len(points_F))]), points_W, rcond=None)[0]
+        p, q = (points_F.mean(0), points_W.mean(0)) if centered else (0, 0)
+        affine = np.linalg.lstsq(np.column_stack([points_F - p, np.ones(len(points_F))]), points_W - q, rcond=None)[0]
         U, _, Vt = np.linalg.svd(affine[:3].T)
         T = np.eye(4)
         T[:3, :3] = U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt
@@ -731,6 +799,11 @@ def _lever_of_a_measured_link():
     return distance[2] / angle[2]
 
 
+def _farthest_point():
+    T, u = chaining.chain(lab_sheet.printed_transforms()), np.random.default_rng(0).normal(size=(10000, 3))
+    return np.linalg.norm(frames.transform(T, 1000 * u / np.linalg.norm(u, axis=1)[:, None]), axis=1).max()
+
+
 def _hole_by_matrices():
     return 200 * np.linalg.norm((ch01_exercises._K0_T_K1() - ch01_exercises._drawn())[:3, :3])
 
@@ -753,6 +826,8 @@ def _hole_along_x():
         (exercises, "even_lever", _lever_of_a_measured_link, "the third link alone"),
         (ch01_exercises, "distance", _hole_by_matrices, "the root of 2 times the distance"),
         (ch01_exercises, "distance", _hole_along_x, "lies off in y too"),
+        (ch01_exercises, "angle_deg", lambda: 90 + np.rad2deg(np.arcsin(0.01)), "180 deg less the angle"),
+        (exercises, "worst_at_one_meter", _farthest_point, "Subtract p"),
     ],
 )
 def test_a_neighbor_within_the_tolerance_is_named(chapter, name, answer, words):
@@ -1009,6 +1084,12 @@ def test_a_number_that_counts_otherwise_is_explained():
         told = judged("read_system", lambda text, full=full: read([*filter(full, text.splitlines())], 1)).text
         assert "Empty lines and comments are lines of the file too" in told
     assert "is it 0 in your count?" in judged("read_system", lambda text: read(text.splitlines(), 0)).text
+
+
+def test_digits_of_another_number_name_no_line():
+    assert beyond._names("line 2: no point", 2) and beyond._names("stopped in line 2.", 2)
+    assert not any(beyond._names(said, 2) for said in ("2.439 6.292", "at 1,2", "12 lines", "-2", "line 21"))
+    assert beyond._quoted("a" * 999).endswith("...'") and beyond._quoted("line 2") == "'line 2'"
 
 
 def test_an_empty_text_is_said_to_be_one():

@@ -982,7 +982,10 @@ def test_words_count_without_their_case_and_wrong_ones_are_quoted():
 def test_a_name_from_a_cell_not_yet_run_is_explained():
     outcome = DOUBLE.judge(lambda v: normalize(v))  # noqa: F821
     assert outcome.status == RAISED
-    assert "`normalize` is not known: has the cell that defines it been run since the kernel started?" in outcome.text
+    assert (
+        "`normalize` is not known: it is defined neither where it is read nor in a cell that has been run"
+        in outcome.text
+    )
 
 
 def test_questions_end_without_a_second_mark():

@@ -85,6 +85,16 @@ def test_relations_of_rotations(change, told):
     assert told in words(change, TURNS, metrics.Rotations())
 
 
+@pytest.mark.parametrize("metric, poses", [(metrics.Rotations(), False), (metrics.Poses(), True)])
+def test_axes_that_point_the_other_way_are_named(metric, poses):
+    right = [matrix_from_kuka([*RNG.normal(size=3) * 100, *RNG.normal(size=3)]) for _ in range(3)]
+    right = right if poses else [T[:3, :3] for T in right]
+    signs = (1, -1, -1, 1)[: len(right[0])]
+    assert relations.turned_axes(metric, [(T * signs, T) for T in right]) == "your y and z point the other way"
+    assert relations.turned_axes(metric, [(T * signs, T) for T in right[:2]] + [(right[2], right[2])]) is None
+    assert relations.turned_axes(metrics.Numbers(), [(-right[0], right[0])]) is None
+
+
 def test_a_pose_that_is_wrong_in_one_part_says_by_how_much():
     poses = [matrix_from_kuka([*RNG.normal(size=3) * 100, *RNG.normal(size=3)]) for _ in range(3)]
     assert "off by 7 mm" in words(changed((0, 3), lambda x: x + 7.0), poses, metrics.Poses())

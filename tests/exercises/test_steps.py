@@ -138,6 +138,23 @@ def test_the_line_and_the_slip_are_told(right, wrong, said):
             """,
             "in line 2, `(9 * a).astype(int)`: `astype` is too much.",
         ),
+        (
+            """
+            total = 7.3
+            total += len(b) * np.linalg.norm(b - (b @ a) / (a @ a) * a)
+            return total
+            """,
+            "`+=` keeps what was there before, which does not belong to the result: `=`.",
+        ),
+        (
+            """
+            total = len(b) * np.linalg.norm(b - (b @ a) / (a @ a) * a)
+            if a[0] < 0:
+                total = -total
+            return total
+            """,
+            "in line 3, `if a[0] < 0:`: what stands under this condition should never happen.",
+        ),
     ],
 )
 def test_what_is_blamed_is_what_a_student_can_change(body, said):

@@ -126,7 +126,7 @@ def kuka_pose(rng, A_deg=(-170, 170), B_deg=(-80, 80), C_deg=(-170, 170)):
 A_RANGES = ((-80, 80), (100, 170), (-170, -100))  # deg: both signs of r00, and of r10
 B_RANGES = ((-80, -5), (5, 80), (-80, 80))  # deg: below and above 0 at every check
 QUADRANTS = ((10, 80), (100, 170), (-170, -100), (-80, -10))  # deg: both signs of sine and cosine
-NEAR_THE_POLE = (((-170, 170), (86, 89)), ((-170, 170), (-89.99, -89.98)))  # deg: A and C are still two angles
+NEAR_THE_POLE = ((88, 89), (-89.99, -89.98))  # deg: A and C are still two angles
 ROUND = {"A_deg": (185, 355), "B_deg": (-260, -190), "C_deg": (-355, -185)}  # as whoever adds up turns has them
 POINT = "a point has three coordinates"
 POSE = "one pose is one 4x4 matrix"
@@ -476,6 +476,9 @@ def drawn_points(rng, flat=False, count=None):
             return points_F, frames.transform(T_WF, points_F) + 0.5 * rng.normal(size=(n, 3))
         points_F[:, 2] = rng.uniform(-100, 100) + rng.permutation(np.resize([0.5, -0.5, 1.0], n))
         points_W = frames.transform(T_WF, points_F * [1, 1, -1] + [0, 0, 2 * points_F[:, 2].mean()])
+        points_W += 0.01 * rng.normal(
+            size=(n, 3)
+        )  # else an affine map of them is a mirror image, with three equal singular values
         if np.linalg.det(points_F.T @ points_W) < -1e9:  # mm^6, of about 1e13
             return points_F, points_W
 
@@ -572,7 +575,9 @@ CHAPTER = Chapter(
                     id="normalize-a1a562",
                 ),
                 Mistake(
-                    lambda v: v / len(v), "`len(v)` counts the components. The length you need is `np.linalg.norm(v)`."
+                    lambda v: v / len(v),
+                    "You divide by 3, the number of the components, as `len(v)` counts them. The length you need is `np.linalg.norm(v)`.",
+                    id="normalize-2139dc",
                 ),
                 Mistake(
                     lambda v: v / np.abs(v).mean(),
@@ -668,7 +673,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _second_edge_first,
-                    "You started with b: your y is exact and x gives way. The sheet trusts the first edge, so start with a.",
+                    "Your y runs along b, and x gives way. The sheet trusts the first edge: x runs along a, and y takes what b has across it.",
+                    id="gram_schmidt-ce3914",
                 ),
                 Mistake(
                     _left_handed,
@@ -680,11 +686,14 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a, b: frames.gram_schmidt(a, b) * (1, -1, -1),
-                    "Your y points away from b, and z with it: y is b minus its part along x, not the other way round.",
+                    "Your y points away from b, and z the wrong way with it: y is b minus its part along x, not the other way round; by cross "
+                    "products z = a cross b, and y = z cross x.",
+                    id="gram_schmidt-58f852",
                 ),
                 Mistake(
                     lambda a, b: frames.gram_schmidt(a, b) * (-1, -1, 1),
-                    "Your x points against a: QR leaves the signs open. Turn each column to the side of its edge.",
+                    "Your x points against a, and y away from b. (QR leaves the signs open: turn each column to the side of its edge.)",
+                    id="gram_schmidt-2662c3",
                 ),
                 Mistake(
                     lambda a, b: np.linalg.qr(np.column_stack([a, b, np.cross(a, b)]))[0],
@@ -725,7 +734,8 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     _frame(lambda a, b: frames.gram_schmidt(-a, -b)),
-                    "Your edges point toward the origin: it is x_point - origin, not origin - x_point.",
+                    "Your x and y axes point backward, as edges toward the origin make them: it is x_point - origin, not origin - x_point.",
+                    id="frame_from_points-71040f",
                 ),
                 Mistake(
                     _axes_in_rows,
@@ -883,7 +893,9 @@ CHAPTER = Chapter(
                     "This is T_WB T_AW: the motion that carries A to B, seen from W. Seen from A it is T_AW T_WB.",
                 ),
                 Mistake(
-                    lambda A, B: frames.relative(B, A), "This is T_BA, the inverse: you inverted T_WB instead of T_WA."
+                    lambda A, B: frames.relative(B, A),
+                    "This is T_BA, the inverse, as T_BW T_WA gives it. T_AB is T_AW T_WB: T_WA is the one to be inverted.",
+                    id="relative-208794",
                 ),
                 Mistake(
                     lambda A, B: A @ B, "You multiplied T_WA by T_WB without inverting: in T_WA T_WB nothing cancels."
@@ -956,8 +968,9 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: 180 - np.rad2deg(frames.rotation_angle(_K0_T_K1())),
-                    "This is 180 deg less the angle: a sign, or a direction, is turned around.",
+                    "This is 180 deg less the angle, or as good as that: a sign, or a direction, is turned around.",
                     id="angle-turned-around",
+                    within=1e-3,
                 ),
                 Mistake(
                     lambda: np.deg2rad(frames.rotation_angle(_K0_T_K1())),
@@ -1191,7 +1204,7 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         _never_negative(3 + k, sine),
-                        f"Your {word} of {angle} is never negative. A root of 1 less a square has lost its sign: take np.{word[:3]}.",
+                        f"Your {word} of {angle} is never negative, as a root of 1 less a square is: take np.{word[:3]}.",
                         id=f"kuka-positive-{word}-{angle}",
                     )
                     for k, angle in enumerate("ABC")
@@ -1220,11 +1233,19 @@ CHAPTER = Chapter(
             reference=frames.kuka_from_matrix,
             draw=tuple(
                 lambda rng, A_deg=A_deg, B_deg=B_deg: (frames.matrix_from_kuka(kuka_pose(rng, A_deg, B_deg)[0]),)
-                for A_deg, B_deg in (*zip(A_RANGES, B_RANGES), *NEAR_THE_POLE)
+                for A_deg, B_deg in zip(A_RANGES, B_RANGES)
             ),
             fixed={"T": POSE},
             metric=_read_by_kuka(1e-6),
             noisy=[
+                (
+                    lambda rng, B_deg=B_deg: (frames.matrix_from_kuka(kuka_pose(rng, B_deg=B_deg)[0]),),
+                    _read_by_kuka(1e-6),
+                    f"right away from the poles, but not {words} beside one, where A and C still are two angles:",
+                )
+                for B_deg, words in zip(NEAR_THE_POLE, ("a degree or two", "a hundredth of a degree"))
+            ]
+            + [
                 (at_the_pole(sign), _read_by_kuka(1e-4), words)
                 for sign, words in (
                     (1, "right away from the pole, but not at B = 90 deg:"),

@@ -160,7 +160,8 @@ class reads_back(metrics.Metric):
         try:
             return read_system(result).view(ReadBack)
         except ValueError as fault:
-            raise metrics.Refused(f"what you wrote cannot be read: {fault}") from None
+            bare = ". A heading needs a # before it" if _begins_with_words(result) else ""
+            raise metrics.Refused(f"what you wrote cannot be read: {fault}{bare}") from None
 
     def deviations(self, result, expected):
         off = float(np.abs(result - self.admit(expected, expected)).max())
@@ -168,6 +169,15 @@ class reads_back(metrics.Metric):
 
     def parts(self, result, expected):
         return [("", metrics.Numbers(0.0, "mm"), result, self.admit(expected, expected))]
+
+
+def _begins_with_words(text):
+    """Whether the first line of a text is none of three points, which stand below it."""
+    heading, _, points = text.lstrip("\n").partition("\n")
+    try:
+        return bool(heading) and read_system(points) is not None
+    except ValueError:
+        return False
 
 
 FAULTS = (
@@ -209,6 +219,7 @@ def names_the_line(student, rng):
     return None
 
 
+LONGEST = 150  # characters of a sentence that are shown
 ACCEPTED = "that must raise a ValueError, yours returned something."
 
 
@@ -222,7 +233,7 @@ def _misplaced(student, above, good):
     if not named or number in named:
         return None
     where = f"line {number} of a file is a fourth point, the same as the first in line {first}"
-    return f"{where}: your sentence names another line. It says: {refusal!r}."
+    return f"{where}: your sentence names another line. It says: {_quoted(refusal)}."
 
 
 def _misread(student, lines, number, what):
@@ -238,7 +249,12 @@ def _misread(student, lines, number, what):
         why = " The first line is line 1: is it 0 in your count?"
     elif any(_names(refusal, sum(map(bool, map(held, lines[:number])))) for held in (str.strip, _content)):
         why = " Empty lines and comments are lines of the file too: are they left out before lines are counted?"
-    return f"{where}: your sentence does not name the line. It says: {refusal!r}.{why}"
+    return f"{where}: your sentence does not name the line. It says: {_quoted(refusal)}.{why}"
+
+
+def _quoted(sentence):
+    """A sentence as it was raised, the end of a long one left out."""
+    return repr(sentence if len(sentence) <= LONGEST else f"{sentence[:LONGEST]} ...")
 
 
 def _content(line):
@@ -247,7 +263,8 @@ def _content(line):
 
 
 def _names(refusal, number):
-    return bool(re.search(rf"(?<![-\d]){number}\b", refusal))
+    """Whether a sentence holds this number, and not as a part of another one."""
+    return bool(re.search(rf"(?<![-\d])(?<!\d[.,]){number}(?![.,]?\d)\b", refusal))
 
 
 def _refusal(student, lines, words):

@@ -497,7 +497,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda Ts: np.eye(4),
-                    "This is the identity: the products are formed but not kept. Write T = T @ link.",
+                    "This is the identity: no product is kept. In a loop over the links, write T = T @ link.",
+                    id="chain-87b725",
                 ),
                 Mistake(
                     lambda Ts: Ts[0],
@@ -513,7 +514,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _from(np.zeros((4, 4))),
-                    "You started with zeros, and everything times zero is zero. Start with the identity, np.eye(4).",
+                    "Every entry is 0, as in a product that starts with zeros: start with the identity, np.eye(4).",
+                    id="chain-796a27",
                 ),
                 Mistake(
                     _from(np.ones((4, 4))),
@@ -529,11 +531,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda Ts: Ts[-1],
-                    "This is the last link alone: each turn of the loop throws away what came before. Write T = T @ link.",
+                    "This is the last link alone. In a loop over the links, T = T @ link keeps what came before.",
+                    id="chain-eef2ea",
                 ),
                 Mistake(
                     lambda Ts: Ts[-2] @ Ts[-1],
-                    "This is the product of the last two links alone: each turn of the loop throws away what came before. Write T = T @ link.",
+                    "This is the product of the last two links alone. In a loop over the links, T = T @ link keeps what came before.",
+                    id="chain-c5c121",
                 ),
                 Mistake(
                     lambda Ts: chaining.stations(Ts),
@@ -665,7 +669,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _distance(lambda T: np.linalg.norm(T[3, :3])),
-                    "You took the last row. The translation stands in the last column, T[:3, 3].",
+                    "Your distance is 0 for every T, as the length of the last row is without its 1. The translation stands in the last column, T[:3, 3].",
+                    id="closure_error-d13966",
                 ),
                 Mistake(
                     _distance(lambda T: np.linalg.norm(T[:2, 3])),
@@ -887,6 +892,7 @@ CHAPTER = Chapter(
                     lambda: 1000 + chaining.closure_error(_sheet())[1],
                     "This is how far the displaced point is from the origin. Subtract p.",
                     id="meter-no-difference",
+                    within=0.2,  # of directions tried, none points along the shift
                 ),
                 *_of_either_angle(
                     lambda angle, distance: 1000 * np.rad2deg(angle),
@@ -1044,6 +1050,11 @@ CHAPTER = Chapter(
                 Mistake(
                     _svd_variant(lambda U, s, Vt: U * Vt),
                     "You multiplied entry by entry: `*` is not `@`.",
+                ),
+                Mistake(
+                    lambda T: _with_rotation(T, T[:3, :3] @ (3 * np.eye(3) - T[:3, :3].T @ T[:3, :3]) / 2),
+                    "R (3 I - Rᵀ R) / 2 is one step of an iteration toward the nearest rotation, good enough where R is hardly worn: take the SVD.",
+                    id="orthonormalize-first-order",
                 ),
                 Mistake(
                     _one_step,
