@@ -266,14 +266,15 @@ class Explanations(Named):
         if near and not self._right_to_many_digits(most):
             return near
         missed = [(args, *pair) for args, pair in zip(self.inputs, pairs) if not metric.equal(*pair)]
-        example = self._example(*missed[0])
+        shown = max(missed, key=lambda draw: _times_off(self._worst([draw[1:]])))
+        example = self._example(*shown)
         if len(missed) < len(pairs):
-            example = example or f"{NOT_RIGHT}{self._call(missed[0][0])}"
+            example = example or f"{NOT_RIGHT}{self._call(shown[0])}"
         own = isinstance(metric, metrics.Exactly) and type(metric).deviations is not metrics.Exactly.deviations
         words = None if own else cases.result_words(pairs)
         if 0 < len(missed) < len(pairs) and (axes := relations.turned_axes(metric, [pair for _, *pair in missed])):
             words = f"{axes} where the result is wrong"
-        told = closed(words or str(self._worst([missed[0][1:]]) if example else most))
+        told = closed(words or str(self._worst([shown[1:]]) if example else most))
         if len(missed) == len(pairs):
             side = cases.side_words(pairs)
             told = f"{told[:-1]}, and {side}." if side else told
@@ -286,7 +287,7 @@ class Explanations(Named):
     def _worst(self, pairs):
         """The deviation that is farthest beyond its tolerance; None where none is."""
         off = [d for pair in pairs for d in self.exercise.metric.deviations(*pair) if not d.within]
-        return max(off, key=lambda d: d.amount / max(d.tolerance, 1e-300), default=None)
+        return max(off, key=_times_off, default=None)
 
     def _example(self, args, result, expected):
         """One call that did not come out right, with what it gives, if all can be shown whole; the right result is told
@@ -335,6 +336,11 @@ class Explanations(Named):
             words = own_steps.condition_words(self.function, given, missed, kind) or words
         was = "was not right" if stopped else "was wrong"
         return words and f"On {len(draws)} draws it {was} {words}."
+
+
+def _times_off(deviation):
+    """How many tolerances something is off."""
+    return deviation.amount / max(deviation.tolerance, 1e-300)
 
 
 def has_loop(function):

@@ -72,6 +72,7 @@ WITHOUT = {
 REDUCTIONS = {"sum", "mean", "median", "std", "var", "prod", "max", "min", "norm", "argmax", "argmin", "any", "all"}
 COARSE, FINE = 1e-6, 1e-6  # from which on a bound or a step of differences may be too large, and what part of it is not
 FINER = -1  # the rank of what is made finer: few changes, tried by themselves, before others make loops without an end
+TINY, LONGER = 1e-6, 1000  # up to which a step of differences may be too short, and how many times as long is not
 ADDED = 0.01  # up to which a number that is added may be there to keep a divisor from 0
 ITERATION = 20  # rounds of a loop that goes on until nothing changes, and not through what is given
 ROUNDS = 200  # of a loop, or ten times as many as it has: enough for what converges
@@ -359,7 +360,13 @@ def mending(function):
         *_exchanged_throughout(function),
         *_from_the_first(function),
     ]
-    found += [*_shorter_steps(function), *_rounded_pi(function), *_never_reached(function), *_unstacked(function)]
+    found += [
+        *_shorter_steps(function),
+        *_longer_steps(function),
+        *_rounded_pi(function),
+        *_never_reached(function),
+        *_unstacked(function),
+    ]
     found += _lost_signs(function)
     found += _of_diagonals(function)
     found += _sizes(function)
@@ -585,6 +592,45 @@ def _finer_differences(function):
         if sets := _together(group):
             mends = f"`{step}` is far too long a step for differences: a millionth of it will do, wherever it stands"
             yield Change("", mends, FINER, quotients[0], sets)
+
+
+def _longer_steps(function):
+    """Tiny steps of differences made a thousand times as long, wherever they stand: rounding is divided by them."""
+    tiny = [found for found in _typed(function) if type(found[-1].value) is float and 0 < found[-1].value <= TINY]
+    for number in sorted({node.value for *_, node in tiny}):
+        alike = [found for found in tiny if found[-1].value == number]
+        if not _is_step(function, {node for *_, node in alike}):
+            continue
+        group = []
+        for owner, field, content, i, node in alike:
+            new = ast.copy_location(ast.Constant(LONGER * number), node)
+            whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
+            group.append(Change("", "", FINER, node, ((owner, field, whole),)))
+        if sets := group[0].sets if len(group) == 1 else _together(group):
+            mends = f"rounding shows where a step is as short as this: {LONGER * number:g} will do"
+            yield Change("", mends, FINER, group[0].place, sets)
+
+
+def _is_step(function, numbers):
+    """Whether numbers that are typed in, or a name bound to them, are added somewhere and divide without a sum."""
+    bound = set()
+    for step in (node for node in ast.walk(function) if isinstance(node, ast.Assign)):
+        target, value = step.targets[0], step.value
+        both = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+        pairs = zip(target.elts, value.elts) if both else [(target, value)]
+        bound |= {to.id for to, of in pairs if of in numbers and isinstance(to, ast.Name)}
+
+    def holds(part):
+        return any(node in numbers or getattr(node, "id", None) in bound for node in ast.walk(part))
+
+    sums = [n for n in ast.walk(function) if isinstance(n, ast.BinOp | ast.AugAssign) and _adds(n)]
+    divisors = [n.right for n in ast.walk(function) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Div)]
+    divisors += [n.value for n in ast.walk(function) if isinstance(n, ast.AugAssign) and isinstance(n.op, ast.Div)]
+    return any(map(holds, sums)) and any(holds(d) and not any(map(_adds, ast.walk(d))) for d in divisors)
+
+
+def _adds(node):
+    return isinstance(getattr(node, "op", None), ast.Add | ast.Sub)
 
 
 def _begun_late(function):

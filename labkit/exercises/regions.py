@@ -35,7 +35,7 @@ def change_words(value, answer, is_right, seconds):
     if value.chapter is None:
         return None
     unchanged, changed = _variants(value, seconds)
-    if unchanged is None or not is_right(unchanged):
+    if unchanged is None or not is_right(unchanged) or relations.are_fractions(answer, unchanged):
         return None
     words = next((words for words, found in changed if _agrees(answer, found) and not _is_put_in(answer, words)), None)
     return words and f"this is what a right computation gives {words}"

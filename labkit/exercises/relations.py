@@ -435,6 +435,15 @@ def ratio_words(answer, expected):
     return None
 
 
+def are_fractions(answer, expected):
+    """Whether two numbers are quotients of small whole numbers: many a change makes one of the other, by chance."""
+    return not np.ndim(expected) and all(_is_fraction(float(number)) for number in (answer, expected))
+
+
+def _is_fraction(number):
+    return any(abs(m * number - round(m * number)) < EXACT for m in range(1, SIMPLE + 1)) and abs(number) < SIMPLE
+
+
 def _fraction(ratio):
     """A simple fraction, or the root of one, that a ratio is, in words; None where it is none."""
     for power, form in ((1, "{}"), (2, "the root of {}")):

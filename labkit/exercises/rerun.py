@@ -132,6 +132,27 @@ def _bare(node):
     return node
 
 
+def _searched(tree):
+    """Lines of calls that are handed a function, as a search for a minimum is, and of what else they are handed: where
+    a search begins, the right result stays where it is.
+    """
+    functions = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+    functions |= {
+        node.targets[0].id
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Lambda) and isinstance(node.targets[0], ast.Name)
+    }
+    read = set()
+    for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
+        handed = [*call.args, *(keyword.value for keyword in call.keywords)]
+        if any(isinstance(part, ast.Lambda) or getattr(part, "id", None) in functions for part in handed):
+            read |= {n.id for part in handed for n in ast.walk(part) if isinstance(n, ast.Name)}
+            yield from range(call.lineno, call.end_lineno + 1)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node.id in read:
+            yield node.lineno
+
+
 def _iterated(tree):
     bound = [node for node in ast.walk(tree) if isinstance(node, ast.Assign | ast.AugAssign)]
     loops = [node for node in ast.walk(tree) if isinstance(node, ast.For | ast.While)]
@@ -164,8 +185,8 @@ class Written:
 
     @functools.cached_property
     def iterated(self):
-        """Lines in which a variable is bound that a loop makes anew of itself."""
-        return {line for tree in self.trees for line in _iterated(tree)}
+        """Lines in which a variable is bound that a loop makes anew of itself, or that a search begins with."""
+        return {line for tree in self.trees for lines in (_iterated, _searched) for line in lines(tree)}
 
     @functools.cached_property
     def _changes(self):

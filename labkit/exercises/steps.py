@@ -42,8 +42,15 @@ CHANCE = 1000  # one case of so many may be chance
 BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
 UNBOUNDED = {f"`{name}` is too much" for name in mutation.BOUNDED | mutation.BOUNDS}
 DECIMALS = re.compile(r"[<>]=? *\d*(\.\d+(e[+-]?\d+)?|e-\d+)$|[<>]=? *\d+e-\d+$")  # a comparison with such a number
-FEW_ROUNDS = re.compile(r"these are too few rounds: (\d+) will do")
-GO_ON = "Go on until nothing changes, or choose what needs no rounds"
+NEARER = {  # what brings a result nearer on every draw, and what is said where it is not there yet
+    re.compile("these are too few rounds: (.+) will do"): (
+        "with {} rounds {}. Go on until nothing changes, or choose what needs no rounds"
+    ),
+    re.compile("rounding shows where a step is as short as this: (.+) will do"): (
+        "with {} in its place {}. Of differences over so short a step rounding shows"
+    ),
+}
+COMES_NEARER = "the result comes nearer on every draw, and is not there yet"
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
 TURNED, OTHER_SIGN = "has the wrong sign", "the sign is the other one"
 UNEQUAL = ("where `==` belongs", "where `!=` belongs")  # what computed numbers are never, or always
@@ -463,9 +470,11 @@ class Search:
 
     @_or_nothing
     def nearer_words(self):
-        """That more rounds of a loop bring the result nearer on all draws, though these are not enough either."""
+        """That more rounds of a loop, or a longer step, bring the result nearer on all draws, yet not near enough."""
         for k, (_, line, code, mends) in enumerate(self.written.changes):
-            found = FEW_ROUNDS.match(mends)
+            found, words = next(
+                ((f, words) for known, words in NEARER.items() if (f := known.match(mends))), (None, "")
+            )
             if found is None or any(case.result is None for case in self.cases):
                 continue
             fits = (
@@ -475,8 +484,7 @@ class Search:
                 for case in self.cases
             )
             if all(fit == [True] for fit in fits):
-                more = f"with {found[1]} rounds the result comes nearer on every draw, and is not there yet"
-                return f"in line {line}, `{code}`: {more}. {GO_ON}"
+                return f"in line {line}, `{code}`: {words.format(found[1], COMES_NEARER)}"
         return None
 
     def _gains(self, plans, right, kind):
@@ -544,6 +552,7 @@ class Search:
                 and not self._is_entry_bound(k)
                 or self._are_rows(k)
                 or self._is_unfilled(k)
+                or self._is_rearranged(k)
             ):
                 continue
             for q in solution.distinct:
@@ -578,8 +587,17 @@ class Search:
         return plan and "in line {1}, `{2}`: {3}. {told}".format(*changes[plan[1]], told=ALONE)
 
     def _is_no_step(self, k):
-        """Whether the right result in a value's place says nothing: in the result's, and where an iteration goes on."""
+        """Whether the right result in a value's place says nothing: in the result's, and where an iteration goes on or
+        a search begins.
+        """
         return self.is_result(k) or self.written.places[k][0] in self.written.iterated
+
+    def _is_rearranged(self, k):
+        """Whether a value holds the numbers of the result in another shape: that they are wrong says nothing."""
+        pairs = [(values[k][1], result) for values, result in zip(self.values, self.results) if values[k][0]]
+        return bool(pairs) and all(
+            r is not None and v[-1].shape != r.shape and _same(v[-1].ravel(), r.ravel()) for v, r in pairs
+        )
 
     def _are_rows(self, k):
         """Whether a value is, round by round, the rows of the result."""
@@ -804,8 +822,8 @@ class Search:
         codes = dict.fromkeys(f"`{self.written.places[part][1]}`" for part in computed)
         if not codes:
             return ""
-        are, them = ("are", "them") if len(codes) > 1 else ("is", "it")
-        return f", though {' and '.join(codes)} in it {are}: look at what is done with {them}"
+        are, them = ("are values", "them") if len(codes) > 1 else ("is a value", "it")
+        return f", though {' and '.join(codes)} in it {are} of the solution as well: look at what is done with {them}"
 
 
 @_or_nothing

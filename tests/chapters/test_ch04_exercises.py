@@ -49,7 +49,8 @@ def test_a_slope_is_looked_at_before_the_kind(seed):
     "moves, words",
     [
         (lambda g: g @ g > 1e-6, "square of the length"),
-        (lambda g: (abs(g) > 1e-6).any(), "each entry"),
+        (lambda g: (abs(g) > 1e-6).any(), "both entries just below 1e-6"),
+        (lambda g: np.sqrt(np.mean(g**2)) > 1e-6, "both entries just below 1e-6"),
         (lambda g: np.linalg.norm(g) > 1e-3, "limit"),
         (lambda g: np.linalg.norm(g) > 0.1, "limit"),
     ],
@@ -209,6 +210,23 @@ def test_a_step_need_not_go_straight_down(seed):
 
     for answer in (straight, of_a_positive_cost):
         assert judged("gain_ratio", answer, seed).status == NOT_YET
+
+
+@pytest.mark.parametrize(
+    "place, words",
+    [
+        (wells.extrema()[0].x + 1e-8, "that is a minimum"),
+        (wells.extrema()[1].x - 1e-5, "that is a minimum"),
+        (np.array([3e4, -2e4]), "far out on the plain"),
+        (np.array([0.0, 0.0]), "There the gradient is 11.1 long"),
+    ],
+)
+def test_a_place_where_the_gradient_vanishes_is_told_to_be_no_saddle_by_its_kind(place, words):
+    assert words in judged("saddle", place).text
+
+
+def test_of_few_small_numbers_a_simple_ratio_is_told_and_no_slip():
+    assert judged("tipping_weight", 2.4).text == "your value is 4/3 times the expected one."
 
 
 def test_one_step_toward_the_saddle_is_not_the_saddle():
@@ -450,6 +468,17 @@ def by_forward_differences(x, h=1e-8):
     return np.array([(wells.value(x + e) - wells.value(x)) / h for e in h * np.eye(2)])
 
 
+def by_the_order_of(beside):
+    """Kind by eigenvalues that are taken to be sorted, though they stand as the diagonal has them: `np.linalg.eig`."""
+
+    def variant(g, H):
+        first, second = np.linalg.eigvalsh(H)[:: -1 if beside(H[0, 0], H[1, 1]) else 1]
+        kind = "minimum" if first > 0 and second > 0 else "saddle" if first < 0 < second else "maximum"
+        return "not stationary" if np.linalg.norm(g) > 1e-6 else kind
+
+    return variant
+
+
 CHORD, KIND = ITEMS["rise_above_chord"].reference, ITEMS["classify_extremum"].reference
 FORGETFUL = [
     ("gradient", by_forward_differences),
@@ -464,6 +493,8 @@ FORGETFUL = [
     ("classify_extremum", lambda g, H: KIND(g, H) if g.any() else "not stationary"),
     ("classify_extremum", lambda g, H: KIND(g, H) if np.ptp(np.linalg.eigvalsh(H)) > 1e-9 else "saddle"),
     ("classify_extremum", lambda g, H: KIND(g, H) if np.abs(H).max() > 1e-10 else "saddle"),
+    ("classify_extremum", by_the_order_of(np.greater)),
+    ("classify_extremum", by_the_order_of(np.less)),
     ("newton_step", eliminated(0)),
     ("newton_step", eliminated(1)),
     ("newton_step", of_plain_size(opt.newton_step, small=0)),

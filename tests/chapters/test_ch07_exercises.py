@@ -239,4 +239,4 @@ def by_the_hypotenuse(way, excess, track):
 
 def test_an_argument_is_not_called_right_where_another_one_belongs():
     text = ITEMS["wheel_offset"].judge(by_the_hypotenuse, rng=np.random.default_rng(0)).text
-    assert "though `radius` in it is: look at what is done with it" in text
+    assert "though `radius` in it is a value of the solution as well: look at what is done with it" in text

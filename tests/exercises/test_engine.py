@@ -524,7 +524,7 @@ def test_what_is_off_is_off_in_the_call_that_stands_beside_it(right_below):
     )
     text = exercise.judge(lambda v: 10.0**v + (v**v if v > right_below else 0)).text
     off, v, result = (
-        float(re.search(p, text)[1]) for p in (r"off by (\d[\d.e+]*)", r"\(v=([\d.]+)\)", r"gives ([\d.e+]+)")
+        float(re.search(p, text)[1]) for p in (r"off by (\d[\d.e+]*\d)", r"\(v=([\d.]+)\)", r"gives ([\d.e+]+)")
     )
     assert off == pytest.approx(result - 10.0**v, rel=0.01)
 

@@ -685,6 +685,42 @@ def test_what_is_changed_or_bound_again_is_not_called_right(monkeypatch, body):
     assert "`x`" not in judged(asked(reference, lambda rng: tuple(rng.normal(size=(2, 3)))), body)
 
 
+@pytest.mark.parametrize(
+    "body",
+    [
+        "from scipy.optimize import minimize\nreturn minimize(lambda v: v @ v, np.ones(3)).x",
+        "from scipy.optimize import minimize\nv = np.ones(3)\nreturn minimize(lambda v: v @ v, v).x",
+        "rows = [[x] for x in np.sin(a + b)]\nreturn np.hstack(rows)",
+    ],
+    ids=["start", "start that is bound", "in another shape"],
+)
+def test_where_a_search_begins_and_the_result_in_another_shape_are_not_blamed(monkeypatch, body):
+    """The right result in their place would be right as well, whatever is wrong."""
+    reference = solved_by(monkeypatch, "def formula(a, b):\n    x = np.exp(a)\n    return x * b / (x @ b)\n")
+    told = judged(asked(reference, lambda rng: tuple(rng.uniform(1, 2, size=(2, 3)))), body)
+    assert "With the right value there" not in told
+
+
+@pytest.mark.parametrize(
+    "body, told",
+    [
+        (
+            "h = 1e-11\nreturn (np.sin(a + h) - np.sin(a - h)) / (2 * h)",
+            "in line 2, `1e-11`: rounding shows where a step",
+        ),
+        (
+            "return (np.sin(a + 1e-13) - np.sin(a)) / 1e-13",
+            "with 1e-10 in its place the result comes nearer on every draw",
+        ),
+        ("return np.cos(a) + b * 1e-9 / (b + 1e-9)", ""),
+    ],
+)
+def test_a_step_of_differences_may_be_too_short(body, told):
+    item = replace(asked(lambda a, b: np.cos(a), two_numbers), metric=metrics.Numbers(1e-8))
+    said = judged(item, body) if told else item.judge(typed(body)).text
+    assert told in said and ("step" in said) == bool(told)
+
+
 def test_what_was_given_infinite_is_not_what_went_wrong():
     def impossible(rng):
         return np.array([-np.inf, *rng.normal(size=2)]), rng.normal()

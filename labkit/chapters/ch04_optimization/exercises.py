@@ -91,7 +91,11 @@ def kind_of_point(rng, bends, length, signs=(1, -3), angle_deg=(30, 60), between
 BOWL, DOME, SADDLE, DEEP_SADDLE = (1, 1), (-1, -1), (-1, 1), (1, -1)
 VANISHED, STEEP = (5e-8, 2e-7), (0.5, 3.0)  # |g|: as after an iteration, and as anywhere
 KINDS = (
-    *(functools.partial(kind_of_point, bends=bends, length=VANISHED) for bends in (BOWL, DOME, SADDLE, DEEP_SADDLE)),
+    *(functools.partial(kind_of_point, bends=bends, length=VANISHED) for bends in (BOWL, DOME)),
+    *(  # the larger entry on the diagonal comes second, then first: the eigenvalues of `np.linalg.eig` with it
+        functools.partial(kind_of_point, bends=bends, length=VANISHED, angle_deg=(30, 43))
+        for bends in (SADDLE, DEEP_SADDLE)
+    ),
     functools.partial(kind_of_point, bends=SADDLE, length=VANISHED, angle_deg=(2, 8)),  # its diagonal is mixed
     *(  # the other sign beside the diagonal
         functools.partial(kind_of_point, bends=bends, length=VANISHED, angle_deg=(-60, -30))
@@ -645,9 +649,16 @@ def _repeated_entry(k):
 
 
 def _slope_there(x):
-    """Whether a place is stationary, as a sentence."""
-    slope = np.linalg.norm(wells.gradient(x))
+    """Whether a place is stationary, and of which kind, as a sentence."""
+    slope, bends = np.linalg.norm(wells.gradient(x)), np.linalg.eigvalsh(wells.hessian(x))
+    if np.abs(bends).max() < FLAT:
+        return "There f is nearly flat, far out on the plain, where the gradient fades and vanishes nowhere: start between the wells"
+    if bends.min() > 0 and slope < NEXT_TO * bends.min():
+        return "There the gradient vanishes, or nearly so, and f bends up in all directions: that is a minimum"
     return f"There the gradient is {slope:.3g} long. At a saddle it vanishes"
+
+
+FLAT, NEXT_TO = 1.0, 1e-2  # curvature that is next to nothing; how far off a minimum may be that is told as such
 
 
 CHAPTER = Chapter(
@@ -765,6 +776,13 @@ CHAPTER = Chapter(
                     lambda x: wells.gradient(x) / 100,
                     "The depths are 100 and 200; here they are 1 and 2.",
                     id="gradient-depths",
+                ),
+                Mistake(
+                    lambda x: (
+                        2 * wells.DEPTHS[:, None] * (x - wells.CENTERS) / ((x - wells.CENTERS) ** 2 + 1) ** 2
+                    ).sum(0),
+                    "Each entry has a q of its own here, made of one offset. q = |x − c|² + 1 is one number a well, in which both offsets count.",
+                    id="gradient-own-q",
                 ),
                 *_wide_differences("gradient", wells.value, (0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6), (0.1, 0.01, 1e-3)),
             ],
@@ -1025,7 +1043,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _stationary(_by(np.linalg.eigvalsh), lambda g: (np.abs(g) > 1e-6).any()),
-                    "You compare each entry with 1e-6. Both may be smaller while |g|, the root of the sum of their squares, is larger.",
+                    "A g with both entries just below 1e-6 counts as vanished here, and is longer than that: |g| is the root of the sum of their squares, "
+                    "neither the larger of them nor a mean.",
                     id="classify-entries",
                 ),
                 Mistake(
@@ -1505,6 +1524,22 @@ CHAPTER = Chapter(
                     "The outer product takes x itself. It is that of x − c, the offset from the well's center.",
                     id="jacobian-of-x",
                 ),
+                *(
+                    Mistake(
+                        functools.partial(_jacobian_with, **without),
+                        "The 1 of q = |x − c|² + 1 is missing, under the root at least.",
+                        id=f"jacobian-without-1-{k}",
+                    )
+                    for k, without in enumerate(
+                        (
+                            {"factor": lambda w, q: np.sqrt(w / (q - 1))},
+                            {
+                                "factor": lambda w, q: np.sqrt(w / (q - 1)),
+                                "product": lambda d: np.outer(d, d) * (d @ d + 1) / (d @ d),
+                            },
+                        )
+                    )
+                ),
                 *_wide_differences("jacobian", wells.residual, (0.1, 0.01, 1e-3, 1e-4, 1e-5), (0.1, 0.01)),
             ],
         ),
@@ -1861,7 +1896,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _dogleg(share=lambda a, b, c: (-b + np.sqrt(max(0.0, b * b - a * c))) / a, rim_term=lambda r: r),
-                    "In c the radius is squared: c = pᵀp − Δ².",
+                    "In c the radius is to be squared: c = pᵀp − Δ².",
                     id="dogleg-c-radius",
                 ),
                 Mistake(
@@ -1873,6 +1908,17 @@ CHAPTER = Chapter(
                     lambda g, B, radius: _dogleg(corner=lambda p: p / (g @ g))(g, B, radius),
                     "gᵀg is missing in your corner: p = −(gᵀg / gᵀB g) g.",
                     id="dogleg-corner-gg",
+                ),
+                Mistake(
+                    lambda g, B, radius: _dogleg(corner=lambda p: -g)(g, B, radius),
+                    "Your corner is −g. B belongs to it, too: the lowest point downhill is p = −(gᵀg / gᵀB g) g.",
+                    id="dogleg-corner-g",
+                ),
+                Mistake(
+                    lambda g, B, radius: np.clip(opt.newton_step(g, B), -radius, radius),
+                    "This is the Newton step with each entry cut off at the radius, in a square: it is longer than the radius in places, and has no bend. "
+                    "The dogleg goes downhill first, then toward the Newton point.",
+                    id="dogleg-box",
                 ),
                 Mistake(
                     _dogleg(share=lambda a, b, c: (-2 * b + np.sqrt(4 * b * b - a * c)) / a),
@@ -2113,7 +2159,11 @@ CHAPTER = Chapter(
                     "That is the probability that at least one of all twenty landings is right. A stand-in must have all four right: p = ½⁴.",
                     id="luck-any-landing",
                 ),
-                Mistake(lambda: 0.5**20, "That all five stand-ins have all landings right. One is enough."),
+                Mistake(
+                    lambda: 0.5**20,
+                    "That is the probability that all five stand-ins have all landings right. One is enough.",
+                    id="luck-40ab53",
+                ),
                 Mistake(
                     lambda: 1 - (15 / 16) ** 4,
                     "This tries four stand-ins. Five were tried, with four landings each.",
@@ -2212,6 +2262,16 @@ CHAPTER = Chapter(
                     lambda: 1 + beyond.tipping_weight(),
                     "One too many: w replaces the weight 1 of the printed sum, it is not added to it.",
                     id="tipping-plus-one",
+                ),
+                Mistake(
+                    lambda: beyond.tipping_weight() / (beyond.tipping_weight() + 3),
+                    "That is the share of all weights that w has, w / (w + 3). Asked for is w, beside three weights of 1.",
+                    id="tipping-share",
+                ),
+                Mistake(
+                    lambda: beyond.tipping_weight() / 3,
+                    "That is a third of it. The three other criteria are added up, in both sums: no mean is taken of them.",
+                    id="tipping-mean",
                 ),
                 Mistake(
                     lambda: 8 / 3,
