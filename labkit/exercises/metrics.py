@@ -419,7 +419,7 @@ class Several(Metric):
             try:
                 admitted.append(metric.admit(part, want))
             except Refused as error:
-                if isinstance(result, np.ndarray):  # one array, taken apart into its rows
+                if isinstance(result, np.ndarray) and np.shape(part) != np.shape(want):  # taken apart into its rows
                     raise Refused(f"{wanted}, got one array of shape {result.shape}") from None
                 raise Refused(f"{name}: {error}") from None
         return admitted

@@ -36,6 +36,8 @@ TWINS = {name: (twin,) for pair in PAIRS for name, twin in (pair, pair[::-1])} |
     "pinv": ("transpose",),
     "log": ("log10",),
     "exp": ("exp2",),
+    "multiply": ("outer",),
+    "inner": ("outer",),
     "standard_normal": ("random",),
     "normal": ("uniform",),
 }
@@ -78,7 +80,12 @@ ITERATION = 20  # rounds of a loop that goes on until nothing changes, and not t
 ROUNDS = 200  # of a loop, or ten times as many as it has: enough for what converges
 STACKS = {"column_stack", "hstack", "vstack", "stack", "concatenate"}
 STACKED = "the part"  # how what is wrong begins where one part less is put together
-SIZES = ("len({})", "len({}) - 1", "{}.shape[-1]")  # what a number that is typed in may stand for
+SIZES = (
+    "len({})",
+    "len({}) - 1",
+    "{}.shape[-1]",
+    "len({0}) - {0}.shape[-1]",
+)  # what a number that is typed in may stand for
 TURNED = {"sin": "cos", "cos": "sin"}
 TURNS = {90: "np.pi / 2", 180: "np.pi", 360: "2 * np.pi"}
 ROUNDING = ("round", "around")
@@ -767,6 +774,7 @@ REVERSED = (  # (words of what was changed in a right formula, what is wrong whe
     (r"without one matrix of a product", "one matrix of the product is too many"),
     (r"without `(\w+)=` in one call", r"`\1=` does not belong there"),
     (r"without `(\w+)`", r"`\1` is too much"),
+    (r"without the (second argument of `norm`)", r"the \1 is too many"),
     (r"with one transpose too many, or too few", "one transpose is missing, or too many"),
     (r"with (.+) (turned around|turned over|exchanged)", r"\1 is \2"),
     (r"with the factors of one product `@` in another order", "the factors of this product belong in another order"),
@@ -842,6 +850,9 @@ def _operation(node, names):
     for other in () if one and kind in (ast.Add, ast.Sub) else OTHERS.get(kind, ()):
         words = f"with {SIGNS.get(other, 'another sign')} where {SIGNS.get(kind, 'another sign')} belongs"
         yield 0, words, ast.BinOp(node.left, other(), node.right)
+    if isinstance(node.right, ast.Constant) and kind in (ast.Mult, ast.Pow):  # one asterisk too few, or too many
+        other = ast.Pow if kind is ast.Mult else ast.Mult
+        yield 1, f"with {SIGNS[other]} where {SIGNS[kind]} belongs", ast.BinOp(node.left, other(), node.right)
     if kind in (ast.Sub, ast.Div, ast.MatMult):
         what = {ast.Sub: "one difference turned around", ast.Div: "one quotient turned over"}
         words = f"with {what.get(kind, 'the factors of one product `@` exchanged')}"
@@ -930,6 +941,20 @@ def _call(node, names):
         yield 0, "with `arctan` of a quotient where `arctan2` belongs", quotient
     if inner is not None and not (isinstance(inner, ast.Name) and inner.id in ("np", "rng")):
         yield 1, f"without `{name}`", inner
+    yield from _other_arguments(node, name)
+    yield 2, "with one sign turned", ast.UnaryOp(ast.USub(), node)
+    yield 3, "with one part squared", ast.BinOp(node, ast.Pow(), ast.Constant(2))
+    yield 3, "with the root of one part taken", _numpy("sqrt", node)
+    yield from [] if name in NO_ANGLES else [(3, IN_DEGREES, _numpy("rad2deg", node))]
+
+
+NO_ANGLES = {"norm", "hypot", "sqrt", "eigvalsh", "eigvals", "det", "median", "trace", "len"}  # what these return
+
+
+def _other_arguments(node, name):
+    """A call with an argument less, two exchanged, or along another axis."""
+    if name == "norm" and len(node.args) == 2:  # of a matrix another norm than that of all its numbers
+        yield 1, "without the second argument of `norm`", ast.Call(node.func, node.args[:1], node.keywords)
     for i in range(len(node.args) - 1 if name not in BOUNDED else 0):
         args = [*node.args[:i], node.args[i + 1], node.args[i], *node.args[i + 2 :]]
         yield 1, f"with two arguments of `{name}` exchanged", ast.Call(node.func, args, node.keywords)
@@ -940,13 +965,6 @@ def _call(node, names):
             for axis in (0, 1):
                 changed = [*rest, ast.keyword("axis", ast.Constant(axis))]
                 yield 1, "along another axis in one call", ast.Call(node.func, node.args, changed)
-    yield 2, "with one sign turned", ast.UnaryOp(ast.USub(), node)
-    yield 3, "with one part squared", ast.BinOp(node, ast.Pow(), ast.Constant(2))
-    yield 3, "with the root of one part taken", _numpy("sqrt", node)
-    yield from [] if name in NO_ANGLES else [(3, IN_DEGREES, _numpy("rad2deg", node))]
-
-
-NO_ANGLES = {"norm", "hypot", "sqrt", "eigvalsh", "eigvals", "det", "median", "trace", "len"}  # what these return
 
 
 def _is_guarded(name, args):
@@ -983,7 +1001,8 @@ def _constant(node, names):
     if isinstance(value, bool):
         yield 2, f"with {not value} where {value} belongs", ast.Constant(not value)
     elif isinstance(value, int | float):
-        for other in dict.fromkeys((value + 1, value - 1, -value, value / 2, 2 * value)):
+        nought = (0,) if isinstance(value, float) and 0 < abs(value) <= ADDED else ()  # a bound that is to be 0
+        for other in dict.fromkeys((value + 1, value - 1, -value, value / 2, 2 * value, *nought)):
             if other != value:
                 whole = int(other) if isinstance(value, int) and other == int(other) else other
                 yield 2, f"with {whole} where {value} belongs", ast.Constant(whole)

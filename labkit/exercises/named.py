@@ -1,6 +1,7 @@
 """Which named mistake an answer is: on all draws, by failing alike, or each part of its results by one of its own."""
 
 import copy
+import functools
 
 import numpy as np
 
@@ -8,9 +9,10 @@ from . import budget, guard, metrics
 from .budget import Budget
 from .evidence import MORE_CASES, Evidence
 from .outcome import NOT_YET
-from .results import Refusal, equal_as_written, failure_of
+from .results import Refusal, admitted_by, equal_as_written, failure_of
 
 FEW = 3  # draws on which two rules may well give the same, where they are right on the others
+ONCE_MORE = 5  # plain draws on which a mistake is to show as well: those of one check may all be of one kind by chance
 MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
 
 
@@ -21,9 +23,16 @@ class Named(Evidence):
         """The mistake that explains all plain draws, and the special ones too where those alone are wrong."""
         cases = self._cases()
         for k, mistake in enumerate(self.exercise.mistakes):
-            if all(self._is_mistake(mistake, *case) for case in cases) and self._is_it_again(mistake):
+            alike = all(self._is_mistake(mistake, *case) for case in cases)
+            if alike and self._is_it_again(mistake) and self._is_it_once_more(mistake):
                 return self.outcome(NOT_YET, mistake.text, k)
         return None
+
+    def _is_it_once_more(self, mistake):
+        """Whether an answer is equal to a mistake on some fresh plain draws, where plain draws come out wrong."""
+        if self.exercise.metric is None or self._right_on_plain():
+            return True
+        return self._is_it_on(mistake, (self.exercise.plain_again[number] for number in range(ONCE_MORE)))
 
     def _is_it_again(self, mistake):
         """Whether an answer is equal to a mistake on fresh draws too, where it is one of several, some of them, or a
@@ -55,8 +64,10 @@ class Named(Evidence):
         """Whether the answer gives what a mistake does on (arguments, expected, metric) of each case."""
         kind = Budget(budget.SPECIAL)
         for args, expected, metric in cases:
-            run = guard.run(self.function, args, limit=self.exercise.limit)
-            if run.error is not None or not self._is_mistake(mistake, args, metric, (run.result, expected)):
+            run = guard.run(self.function, args, functools.partial(admitted_by, metric, expected), self.exercise.limit)
+            if run.error is not None and type(run.error) is not type(failure_of(mistake, args)):
+                return False
+            if run.error is None and not self._is_mistake(mistake, args, metric, (run.result, expected)):
                 return False
             if not kind.left():
                 break  # a slow answer is not called more often than it must

@@ -198,7 +198,7 @@ class Written:
         found = []
         for c in self._changes:
             text, around = _shown(c.place, self.lines), self._around.get(c.place)
-            told = f"{text}{WITHIN}{around}" if around and len(c.sets) == 1 else text
+            told = f"{text}{WITHIN}{around}" if around not in (None, text) and len(c.sets) == 1 else text
             found.append((c.rank, c.place.lineno, told, c.mends))
         return found
 

@@ -303,22 +303,22 @@ class Search:
     def _left_out_instead(self, number):
         """What says more than a change that mends only because it makes a part do nothing: that a case is never to be
         met, or always, where what it asks, in its line or before it, is changed otherwise than to a finer bound, or the
-        sign of what it does; that a part is too many, where it has another sign or is made finer; that nothing is to be
-        bounded, where another bound is set.
+        sign of what it does; that a part is too many, where it has another sign or name or is made finer, or the larger
+        one it stands in; that nothing is to be bounded, where another bound is set.
         """
         changes = self.written.changes
         line, code, mends = changes[number][1:]
         at_line = [(k, text, words) for k, (_, at, text, words) in enumerate(changes) if at == line]
         finer = mends.endswith("will do")
-        around = [(k, words) for k, text, words in at_line if _bare(code) in _bare(text) != _bare(code) and not finer]
+        larger = [(k, words) for k, text, words in at_line if _bare(code) in _bare(text) != _bare(code)]
         behind = line - 1 if mends == OTHER_SIGN else line  # the case in which a sign is changed stands before it
-        around += [(k, words) for k, (_, at, _, words) in enumerate(changes) if line != at >= behind and not finer]
-        case = [k for k, words in around if words.endswith(("never happen", "always happen"))]
+        around = larger + [(k, words) for k, (_, at, _, words) in enumerate(changes) if line != at >= behind]
+        fixed = [(k, words) for k, (_, at, _, words) in enumerate(changes) if at >= line and _is_fixed(code)]
+        case = [k for k, words in around if words.endswith(("never happen", "always happen")) and not finer]
+        case += [k for k, words in fixed + larger if words in UNBOUNDED]
         less = [k for k, text, words in at_line if text == code and TOO_MANY in words]
+        less += [k for k, words in larger if TOO_MANY in words and not finer]
         less += [k for k, text, words in at_line if words.startswith(mutation.STACKED) and _bare(code) in _bare(text)]
-        case += [
-            k for k, (_, at, _, words) in enumerate(changes) if at >= line and words in UNBOUNDED and _is_fixed(code)
-        ]
         plan = self.mending([("code", k) for k in case + (less if finer or " stands where " in mends else [])])
         return number if plan is None else plan[1]
 

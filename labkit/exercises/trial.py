@@ -85,6 +85,7 @@ class Trial(Raised, Staying):
         unmoved = None if words or self.refusal else self._unmoved()  # now, since the search may use up the budget
         search = None if words else self._search()
         step = search and search.finer_words()
+        nearer = search and not step and search.nearer_words()  # now, as above
         solution = search and not step and self._solution(search)
         step = step or search and (search.passed_words(solution) or search.notebook_words(solution) or search.words())
         shape = self._other_shape() if self.refusal else ""
@@ -93,7 +94,7 @@ class Trial(Raised, Staying):
             return self.outcome(NOT_YET, closed(words) + self._about_globals())
         if search and not step and not self._right_often():
             step = search.not_finite_words() if self.refusal else None
-            step = step or search.nearer_words() or search.partly_words() or search.given_words(solution)
+            step = step or nearer or search.partly_words() or search.given_words(solution)
         if self.refusal:
             words = shape or (f" {step[0].upper()}{closed(step[1:])}" if step else "")
             words = words or self._agreement(search, solution)

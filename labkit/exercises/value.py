@@ -148,6 +148,8 @@ class Value(Item):
             return f"not this value{self._in_unit()}{right}: the hints lead on."
         if not np.isfinite(answer):
             return f"not this value{self._in_unit()}: the hints lead on."
+        if relations.significant_digits(answer, expected) == 1:
+            return "right to one digit only. If it is rounded, hand over the computed value; else the hints lead on."
         size = "large" if abs(answer) > abs(expected) else "small"
         if answer * expected < 0:
             return f"not this value{self._in_unit()}, and it should have the other sign: the hints lead on."

@@ -448,6 +448,7 @@ def test_a_count_is_not_rounded():
     length = Value("length", reference=lambda: 162.37, hints=("a", "b", "c"), rtol=1e-6)
     assert length.judge(162).status == CORRECT
     assert "as far as it goes" in length.judge(160).text
+    assert "right to one digit only" in length.judge(200).text
 
 
 def test_one_array_for_two_results_is_told_its_shape():
@@ -575,6 +576,8 @@ def test_several_results_are_named():
     assert exercise.judge(lambda v: [v, -v]).status == CORRECT
     assert "pivot: your result is right up to its sign" in exercise.judge(lambda v: (v, v)).text.lower()
     assert "expected 2 results (tip, pivot), got one array of shape (3,)" in exercise.judge(lambda v: v).text
+    nan = exercise.judge(lambda v: np.array([v, np.nan * v])).text  # such an array is taken: it is not its shape
+    assert nan.startswith("pivot: the result holds NaN")
     assert "pivot: expected an array of shape (3,)" in exercise.judge(lambda v: (v, 1.0)).text
 
 

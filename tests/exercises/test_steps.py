@@ -73,6 +73,10 @@ def test_what_is_right_stays_right():
         ("r[k] ** 2", "r[k]", ": its square belongs there. With this alone changed, your result is right."),
         ("total +=", "total =", "in line 7, `total = r[k] ** 2`: `=` throws away what was there before"),
         ("b @ x) * x", "b @ x)", "in line 4, `b @ x`: it is to be multiplied by `x`."),
+        ("r[k] ** 2", "r[k] * 2", "n line 7, `r[k] * 2`: `*` stands where `**` belongs."),
+        ("norm(a)", "norm(a, 1)", "in line 2, `np.linalg.norm(a, 1)`: the second argument of `norm` is too many."),
+        ("b - (b", "b - np.mean([0, 0, 1]) - (b", "in line 4, `b - np.mean([0, 0, 1])`: one term is too many."),
+        ("= 0.0", "= 1e-3", "in line 5, `1e-3`: 0.001 stands where 0 belongs."),
     ],
 )
 def test_the_line_and_the_slip_are_told(right, wrong, said):
@@ -958,6 +962,13 @@ def several(rng):
             _wrapped,
             "return (a + 3.14) % 6.28 - 3.14",
             "in line 2, `3.14`: 3.14 and 6.28 are rounded: np.pi has all the digits.",
+        ),
+        (lambda a, b: b - a, "return np.maximum(b - a, 1 / len(b))", "/ len(b))`: `maximum` is too much"),
+        (lambda a, b: np.maximum(b, 0) + a, "return np.maximum(b, 1e-3) + a", "`1e-3`: 0.001 stands where 0 belongs"),
+        (
+            lambda a, b: np.outer(b, b) @ a,
+            "M = np.multiply(b, b)\nreturn M @ a",
+            "`multiply` stands where `outer` belongs",
         ),
         (_summed, "return a @ a / 30 + b[0]", "in line 2, `30`: 30 is typed in where `len(a)` belongs."),
         (_clipped, "return np.where(a < 0, 0.0, np.where(a > 2, 2.0, a))", "this case needs no treatment of its own."),

@@ -409,7 +409,8 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     lambda A, b: np.linalg.lstsq(A, -b, rcond=None)[0],
-                    "The sign of b is reversed: the solution comes out negated.",
+                    "The solution comes out negated, as it does with the sign of b reversed.",
+                    id="solve_pivot-756de5",
                 ),
                 Mistake(
                     lambda A, b: np.linalg.lstsq(A[:6], b[:6], rcond=None)[0],
@@ -858,7 +859,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _covariance(lambda r, n: 0.0),
-                    "Your covariance is 0. The residuals of least squares add up to 0, and the square of that sum is 0 as well: sum the squares.",
+                    "Your covariance is 0. So is the square of the residuals' sum, as those of least squares add up to 0: sum the squares.",
                     id="covariance-0",
                 ),
                 Mistake(

@@ -138,7 +138,8 @@ def covariance_and_reading(rng, more=None, k=None, p=None, unit=1.0, unlike=0.0)
 def covariance_and_candidates(rng, rules, volume=None, m=None, p=None):
     """A covariance of p parameters and derivatives of m of possible readings among which each of the wrong rules picks another one.
 
-    volume: the smallest determinant that is left, by a choice of units: all above 1, or all 0 to some decimals.
+    volume: the smallest determinant that is left, by a choice of units: all far above 1 and small derivatives, or all
+    0 to some decimals.
     """
     while True:
         C, count = information(rng, p), m or int(rng.integers(7, 13))
@@ -442,7 +443,7 @@ CHOICES = tuple(
     for rules, volume in (
         ((_smallest_trace, _largest_derivative, _largest_volume, _least_certain), None),
         ((_least_certain_volume, _largest_eigenvalue), None),
-        ((_least_certain_first, _least_certain), 10.0),
+        ((_least_certain_first, _least_certain), 1e40),
         ((_product_of_variances, _largest_eigenvalue, _smallest_trace), None),
         ((_largest_information, _largest_derivative, _volume_of_a_part(np.s_[-3:])), 1e-24),
         ((_numbers_alone, _one_in_every_entry), None),
@@ -887,7 +888,7 @@ CHAPTER = Chapter(
                 Mistake(lambda C, c: next_pose(C, c) + 1, "Candidates count from 0."),
                 Mistake(lambda C, c: c[next_pose(C, c)], "This is the candidate's derivative. Asked for is its number."),
                 Mistake(lambda C, c: float(_volumes(C, c).min()), "This is the determinant it leaves. Asked for is the candidate's number."),
-                Mistake(_one_after_the_other, "You return the last one, whatever it brings. So it comes where C keeps what the candidates before it brought, and where the smallest determinant so far is not kept."),
+                Mistake(_one_after_the_other, "You return the last one, whatever it brings. In a loop it comes out where C keeps what the candidates before it brought, or where the smallest determinant so far is not kept.", id="next_pose-64863e"),
                 Mistake(_alone, "You looked at each candidate alone: what is known already, C, makes some of them worth little."),
                 Mistake(lambda C, c: 0, "You return the first one, whatever it brings."),
             ],
