@@ -183,9 +183,12 @@ class Explanations(Named):
         """What results of a wrong shape have to do with the expected ones."""
         if self._is_always_the_same():
             return ""
-        pairs = self._plain_pairs()
-        results = [pair[0].value if isinstance(pair[0], Refusal) else None for pair in pairs]
-        if any(result is None for result in results):
+        metric, pairs = self.exercise.metric, self._plain_pairs()
+        if not all(isinstance(r, Refusal) or metric is not None and metric.equal(r, e) for r, e in pairs):
+            return ""
+        pairs = [pair for pair in pairs if isinstance(pair[0], Refusal)]  # in one size it may be right
+        results = [result.value for result, _ in pairs]
+        if not results or any(result is None for result in results):
             return ""
         names = getattr(self.exercise.metric, "names", ())
         words = shapes.shape_words(results, [expected for _, expected in pairs], names)

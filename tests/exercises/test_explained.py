@@ -505,3 +505,10 @@ def test_one_less_than_a_number_is_told_so_that_its_square_is_plain():
     results = [e * (len(d["x"]) - 1) ** 2 for e, d in zip(expected, few)]
     words = operands.operand_words(NUMBERS, results, expected, few)
     assert words.endswith("times the square of one less than the number of entries of `x`")
+
+
+def test_a_part_is_told_where_it_is_all_of_it_on_some_draws():
+    draws = tuple(lambda rng, n=n: (rng.normal(size=n),) for n in (2, 5, 4))
+    item = Exercise("whole", lambda v: np.exp(v) * v.sum(), draw=draws, metric=NUMBERS, hints=("a", "b", "c"))
+    text = item.judge(lambda v: (np.exp(v) * v.sum())[:2]).text
+    assert "What you return is the first 2 of the expected numbers or rows alone." in text

@@ -2270,7 +2270,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: beyond.tipping_weight() / 3,
-                    "That is a third of it. The three other criteria are added up, in both sums: no mean is taken of them.",
+                    "That is a third of the weight. The three other criteria are added up, in both sums: no mean is taken of them.",
                     id="tipping-mean",
                 ),
                 Mistake(
