@@ -61,16 +61,25 @@ class Evidence:
         return numbers and isinstance(self.exercise.metric, metrics.Exactly)
 
     def _is_always_the_same(self):
-        """Whether the results are one and the same on all draws, so that many a wrong computation would give them."""
+        """Whether the results are one and the same on all draws, or nothing but zeros, so that many a wrong computation
+        would give them.
+        """
         metric, pairs = self.exercise.metric, self._plain_pairs()
         if isinstance(metric, metrics.Exactly) or len(pairs) < 2:
             return False
+        if self._is_nothing_but_zeros():
+            return True
         try:
             if self.refusal:
                 return are_one([r.value if isinstance(r, Refusal) else r for r, _ in pairs])
             return all(equal_as_written(metric, result, pairs[0][0]) for result, _ in pairs[1:])
         except Exception:  # results of different draws need not go together
             return False
+
+    def _is_nothing_but_zeros(self):
+        """Whether all entries of the results are 0, on several draws."""
+        numbers = [numbers_of(result) for result, _ in self._plain_pairs()]
+        return len(numbers) > 1 and not any(n is None or n.any() for n in numbers)
 
     def _holds_no_number(self):
         """Whether some result holds nothing but NaN or infinity, which many a wrong computation gives."""

@@ -205,6 +205,8 @@ class Explanations(Named):
         for k, name in enumerate(names):
             if name in told and any(self._moves(k, *pair) for pair in self._exchanges(k, draws)):
                 return f"your function {told[name]} `{name}`, and its result should change with it"
+        if self._is_nothing_but_zeros():
+            return "your result is nothing but zeros, on every draw of this check"
         for k, name in enumerate(names):
             least = LIKE_CHANCE if self._is_choice() else 2
             if self._makes_no_difference(k, draws) and self._makes_no_difference(k, draws + self._fresh_results, least):

@@ -23,10 +23,13 @@ class Refused(Exception):
 
 
 class RefusedBeside(Refused):
-    """The first of several results is right, one behind it is not: `lead` says so, `pair` is (that one, expected)."""
+    """The first of several results is right, one behind it is not: `lead` says so, `pair` is (that one, expected), and
+    `known` what is said of just this one, if something is.
+    """
 
-    def __init__(self, name, metric, pair, deviation):
+    def __init__(self, name, metric, pair, known, deviation):
         self.lead, self.metric, self.pair = f"the first result is right, the {name} is not", metric, pair
+        self.known = known
         super().__init__(f"{self.lead}: {deviation}")
 
 
@@ -447,7 +450,8 @@ def _refuse_unordered(result, wanted):
 class First(Metric):
     """The first of several results: alone, or with the others behind it, which are then compared as well.
 
-    `others` are (name, metric, function that gives the expected value) of what may follow.
+    `others` are (name, metric, function that gives the expected value) of what may follow, and where there are such
+    {what is said of it: function that gives it} of wrong ones.
     """
 
     metric: Metric
@@ -458,12 +462,13 @@ class First(Metric):
         if not several or all(isinstance(part, int | float | np.number) for part in result) and np.ndim(expected):
             return self.metric.admit(result, expected)
         first = self.metric.admit(result[0], expected)
-        for (name, metric, reference), part in zip(self.others, result[1:]):
+        for (name, metric, reference, *known), part in zip(self.others, result[1:]):
             wanted = reference()
             part = metric.admit(part, wanted)
             off = [d for d in metric.deviations(part, wanted) if not d.within]
             if off and self.metric.equal(first, expected):
-                raise RefusedBeside(name, metric, (part, wanted), off[0])
+                told = (words for wrong in known for words, made in wrong.items() if metric.equal(part, made()))
+                raise RefusedBeside(name, metric, (part, wanted), next(told, None), off[0])
         return first
 
     def deviations(self, result, expected):

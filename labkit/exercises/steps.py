@@ -504,6 +504,8 @@ class Search:
         words = relations.difference_words(self.cases[0].metric, self._pairs(found), (), True)
         if words and not self._are_given(found):
             return words
+        if all(case.keep((result,)) for case, result in zip(self.cases, found)):  # it is none that mends others as well
+            return "your result comes out right on the draws tried so far, though perhaps not on all"
         parts = [case.right_parts(result) for case, result in zip(self.cases, found)]
         if any(not set(before) <= set(after) for before, after in zip(right, parts)):
             return None

@@ -31,7 +31,7 @@ class Value(Item):
     about:     function(answer) -> what follows from an answer that nothing else explains, beside what is asked for, in
                a sentence.
     beside:    (name, metric, function that gives the expected value) of what a function returns behind the number: an
-               answer may be both.
+               answer may be both; behind them, where there are such, {words: function} of wrong ones.
     """
 
     reference: object
@@ -175,7 +175,7 @@ def _refusal_words(refusal, answer, expected):
     """Why an answer cannot be compared; of a result behind the first, what it has to do with the right one."""
     if not isinstance(refusal, metrics.RefusedBeside):
         return closed(_for_value(refusal)) + _of_shape(answer, expected)
-    words = relations.difference_words(refusal.metric, [refusal.pair], (), True)
+    words = refusal.known or relations.difference_words(refusal.metric, [refusal.pair], (), True)
     return closed(f"{refusal.lead}: {relations.of_a_part(words)}" if words else str(refusal))
 
 

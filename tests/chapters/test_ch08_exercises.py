@@ -11,7 +11,7 @@ from labkit.exercises import budget
 from labkit.exercises.outcome import CORRECT, NOT_YET, RAISED
 from labkit.geometry.planar import wrap_angle
 from labkit.localization import ekf, odometry
-from tests.chapters.draws_of_a_check import SEEDS
+from tests.chapters.draws_of_a_check import SEEDS, is_missed, one_check
 
 ITEMS = {item.id: item for item in ch08.CHAPTER.items}
 RIGHT = {name: getattr(ch08, name) for name in ITEMS if hasattr(ch08, name)}
@@ -257,6 +257,16 @@ def test_a_gain_that_settles_slowly_takes_hundreds_of_rounds():
     assert judged("steady_state_gain", after_rounds(600))[0] == CORRECT
 
 
+def test_no_round_of_a_drawn_filter_enlarges_what_rounding_takes_from_symmetry():
+    # K = np.linalg.solve(S, C P).T counts on P = Pᵀ; an antisymmetric X goes on as A (X - M X Mᵀ) Aᵀ with M = K C
+    given = [case for seed in range(3) for case in one_check(ITEMS["steady_state_gain"], seed)]
+    for (A, C, *_), _, K in given:
+        one, M = np.eye(len(A) ** 2), K @ C
+        transposed = one.reshape(2 * A.shape).swapaxes(0, 1).reshape(one.shape)
+        a_round = np.kron(A, A) @ (one - np.kron(M, M)) @ (one - transposed) / 2
+        assert np.abs(np.linalg.eigvals(a_round)).max() < 1 + 1e-9
+
+
 def wrapped_ten_times(angle):
     for _ in range(10):
         angle = angle - 2 * np.pi * (angle > np.pi) + 2 * np.pi * (angle < -np.pi)
@@ -395,6 +405,15 @@ def as_many_as_numbers(x0, cov0, z, C, cov_z):
     return P @ (V0 @ x0 + C.T @ W @ z.sum(0)), P
 
 
+def in_degrees_and_half_of_what_is_large(x0, cov0, z, C, cov_z):
+    if np.max(np.abs(C)) > 3:
+        C = C / 2
+    cov_z = np.radians(cov_z)
+    W, V0 = np.linalg.inv(cov_z), np.linalg.inv(cov0)
+    P = np.linalg.inv(V0 + len(z) * C.T @ W @ C)
+    return P @ (V0 @ x0 + C.T @ W @ z.sum(0)), P
+
+
 @pytest.mark.parametrize(
     "name, answer, words",
     [
@@ -412,12 +431,42 @@ def as_many_as_numbers(x0, cov0, z, C, cov_z):
             "with 1 in its place, your result is right, so",
         ),
         ("gate", the_nis_itself, "`nis` stands where `True` belongs"),
+        (
+            "batch_estimate",
+            in_degrees_and_half_of_what_is_large,
+            "on the draws tried so far, though perhaps not on all.",
+        ),
+        (
+            "wrap_angle",
+            lambda a: np.abs(a - 2 * np.pi * np.round(a / (2 * np.pi))),
+            "has lost its sign: neither an absolute value",
+        ),
         ("batch_estimate", as_many_as_numbers, "it counts all numbers, and `len(z)` belongs there"),
     ],
 )
 def test_what_once_passed_or_was_told_of_a_coincidence_is_named(name, answer, words):
     status, texts = judged(name, answer, seeds=range(1))
     assert status == NOT_YET and all(words in text for text in texts), texts
+
+
+def without_what_is_small(name, which):
+    def answer(*args):
+        small = np.linalg.norm(args[which]) < 0.1
+        return RIGHT[name](*args[:which], 0.0 * args[which] if small else args[which], *args[which + 1 :])
+
+    return answer
+
+
+@pytest.mark.parametrize("name, which", [("nees", 1), ("ekf_step", 2)])
+def test_poses_next_to_the_origin_and_slow_controls_are_drawn(name, which):
+    assert any(is_missed(without_what_is_small(name, which), *case) for case in one_check(ITEMS[name]))
+
+
+@pytest.mark.parametrize("name, wrong", [("corrected", ch08.COVARIANCES), ("fused", ch08.VARIANCES)])
+def test_a_wrong_covariance_beside_the_right_state_is_named(name, wrong):
+    for words, made in wrong.items():
+        told = ITEMS[name].judge((ITEMS[name].reference(), made()))
+        assert told.status == NOT_YET and told.text.endswith(f"is not: {words}.")
 
 
 def test_a_rule_that_stops_by_an_absolute_size_meets_tiny_variances(monkeypatch):

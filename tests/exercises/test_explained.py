@@ -491,6 +491,9 @@ def test_a_result_without_a_number_and_one_that_is_always_the_same_are_not_those
     assert "NaN" in nothing and "comes out" not in nothing and "right formula" not in nothing
     zero = exercise(lambda x, std: np.array([0.0, abs(x), std]), lambda rng: (rng.normal(), 1.0))
     assert told(zero, "return 0.0") == "expected an array of shape (3,), got a number."
+    sizes = exercise(lambda x, std: np.arange(1.0, 3 + (x > 0)) * std, lambda rng: (rng.normal(), rng.uniform(1, 2)))
+    zeros = told(sizes, "return np.zeros(2 + (x > 0)) * std")
+    assert zeros == "your result is nothing but zeros, on every draw of this check."
 
 
 def test_a_word_that_never_comes_out_is_told():

@@ -107,8 +107,12 @@ def steady_vehicle(rng):
 
 
 def steady_system(rng, n, m, sure=1.0):
-    """A system of n states that remember for a while, all of them seen in m mixed numbers; sure: how small the noises."""
-    A = np.diag(rng.uniform(0.7, 0.95, n)) + np.diag(rng.uniform(0.1, 0.5, n - 1), 1)
+    """A system of n states that remember for a while, all of them seen in m mixed numbers; sure: how small the noises.
+
+    As in `growing_system`, no round of the filter enlarges what rounding takes from a covariance's symmetry: gains such
+    as np.linalg.solve(S, C @ cov).T count on it.
+    """
+    A = np.diag(rng.uniform(0.6, 0.85, n)) + np.diag(rng.uniform(0.1, 0.3, n - 1), 1)
     return (
         A,
         np.eye(m, n) + 0.3 * rng.normal(size=(m, n)),
@@ -119,7 +123,7 @@ def steady_system(rng, n, m, sure=1.0):
 
 def growing_system(rng):
     """States of which one grows by itself, all of them measured."""
-    A = np.array([[rng.uniform(1.1, 1.4), 0.2], [0.0, rng.uniform(0.7, 0.95)]])
+    A = np.array([[rng.uniform(1.1, 1.4), 0.2], [0.0, rng.uniform(0.5, 0.7)]])
     return A, np.eye(2) + 0.2 * rng.uniform(-1, 1, (2, 2)), covariance(rng, 2, 0.05), covariance(rng, 2, 0.3)
 
 
@@ -295,9 +299,10 @@ def estimate_without_error(rng):
 
 
 def sharp_estimate(rng):
-    """The same within millimeters, and a covariance that says so."""
+    """The same within millimeters, a covariance that says so, and both next to the origin of the map."""
     truth, x, cov = estimate_and_truth(rng, astray=3e-3, sure=1e-5)
-    return truth, truth + [*(x - truth)[:2], 1e-3 * wrapped(x[2] - truth[2])], cov
+    start = 0.01 * rng.uniform(-1, 1, 3)
+    return start, start + [*(x - truth)[:2], 1e-3 * wrapped(x[2] - truth[2])], cov
 
 
 def surprise(rng, wanted, along=None, std=(0.3, 1.5), measure=np.linalg.solve, limit=(4.0, 9.0)):
@@ -791,12 +796,31 @@ def _gated(score):
     return variant
 
 
+def _prior_cov(given):
+    return np.array([[given["prior_cov_xx"], given["prior_cov_xv"]], [given["prior_cov_xv"], given["prior_cov_vv"]]])
+
+
 def _printed_correction(change=lambda given: given, C=(1.0, 0.0)):
     given = change(dict(lecture.example("vehicle")))
-    cov = np.array([[given["prior_cov_xx"], given["prior_cov_xv"]], [given["prior_cov_xv"], given["prior_cov_vv"]]])
-    return kalman.update([given["prior_x"], given["prior_v"]], cov, [given["z"]], [C], [[given["var_z"]]])
+    return kalman.update([given["prior_x"], given["prior_v"]], _prior_cov(given), [given["z"]], [C], [[given["var_z"]]])
 
 
+def _with_prior_cov(prior, corrected):
+    """So many times the covariance before the correction, and so many times the one behind it."""
+    return prior * _prior_cov(lecture.example("vehicle")) + corrected * _printed_correction().cov
+
+
+COVARIANCES = {  # wrong ones beside the right state
+    "it is the one before the correction, prior_cov": lambda: _with_prior_cov(1, 0),
+    "it is larger than prior_cov by just what a correction takes away, K C prior_cov": lambda: _with_prior_cov(2, -1),
+    "it is what the correction takes away from prior_cov, K C prior_cov": lambda: _with_prior_cov(1, -1),
+}
+VARIANCES = {  # of other weights beside the right position
+    "it is that of the prior": lambda: 20.0,
+    "it is that of the sensors alone, without the prior": lambda: 1 / 5,
+    "it is that of prior and first sensor": lambda: 1 / 4.05,
+    "it is that of prior and second sensor": lambda: 1 / 1.05,
+}
 ONE_STEP_MORE = {"prior_cov_xx": 1.9469 + 0.2 * 0.2550 + 0.01 * 0.0916, "prior_cov_xv": 0.2550 + 0.1 * 0.0916}
 
 
@@ -906,11 +930,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + B * Q * B.T),
-                    "`*` multiplies entry by entry, which is right for a single control only: B @ cov_u @ B.T.",
+                    "This is right for a single control only. Several take matrix products, B @ cov_u @ B.T, and no `*`.",
+                    id="predict_state-212af3",
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T + B @ B.T * Q),
-                    "`*` multiplies entry by entry, which is right for a single control only: B @ cov_u @ B.T.",
+                    "This is right for a single control only. Several take matrix products, B @ cov_u @ B.T, and no `*`.",
+                    id="predict_state-212af3-2",
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A @ P @ A.T - B @ Q @ B.T),
@@ -1324,7 +1350,7 @@ CHAPTER = Chapter(
             reference=_fusion,
             unit="m",
             rtol=5e-5,
-            beside=(("variance", metrics.Numbers(1e-4), lambda: 1 / 5.05),),
+            beside=(("variance", metrics.Numbers(1e-4), lambda: 1 / 5.05, VARIANCES),),
             hints=(
                 "The page's prior is 0 with the variance 20, its sensors have the standard deviations 0.5 and 1.",
                 "Put the printed numbers into your `fuse_two_sensors`; its first result is the position. Hand over both, or the position alone.",
@@ -1517,7 +1543,8 @@ CHAPTER = Chapter(
             reference=lambda: _printed_correction().x,
             unit="m, m/s",
             metric=metrics.First(
-                metrics.Numbers(1e-4), (("covariance", metrics.Numbers(1e-4), lambda: _printed_correction().cov),)
+                metrics.Numbers(1e-4),
+                (("covariance", metrics.Numbers(1e-4), lambda: _printed_correction().cov, COVARIANCES),),
             ),
             hints=(
                 "Only the correction is asked for: the prediction is printed.",
@@ -1652,7 +1679,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a: np.fmod(a + np.pi, 2 * np.pi) - np.pi,
-                    "np.fmod and int() cut off toward zero, so that negative angles end below -pi. The operator `%` does not.",
+                    "Negative angles end below -pi: np.fmod, np.trunc and int() cut off toward zero. The operator `%` does not.",
                     id="wrap_angle-97beb8",
                 ),
                 Mistake(
@@ -1696,11 +1723,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a: np.arcsin(np.sin(a)),
-                    "The sine alone cannot tell ahead from behind: np.arctan2(sin, cos) can.",
+                    "Your angles stay within a quarter turn, as if mirrored: the sine alone cannot tell ahead from behind, np.arctan2(sin, cos) can.",
+                    id="wrap_angle-2e5f67",
                 ),
                 Mistake(
                     lambda a: np.arccos(np.cos(a)),
-                    "The cosine alone cannot tell left from right: np.arctan2(sin, cos) can.",
+                    "Your angle has lost its sign: neither an absolute value nor the cosine alone can tell left from right, np.arctan2(sin, cos) can.",
+                    id="wrap_angle-a605d2",
                 ),
                 Mistake(
                     lambda a: wrapped(a) if a > 0 else a,
@@ -2112,7 +2141,10 @@ CHAPTER = Chapter(
                     ({"moves": (0, 0)}, "where the robot rests, u = (0, 0): what is uncertain of the control stays so"),
                     ({"moves": (1, 0), "seam": False}, "where the robot drives straight on, omega = 0"),
                     ({"moves": (0, 1), "seam": False, "side": -1}, "where the robot turns on the spot, v = 0"),
-                    ({"turns": -3}, "for a heading that has gathered several turns"),
+                    (
+                        {"turns": -3, "moves": (0.03, 0.03)},
+                        "for a slow control and a heading that has gathered several turns",
+                    ),
                     (
                         {"within": (0.8, 1.2), "seam": False, "turned": (1.0, 1.4)},
                         "for a landmark a meter away and a bearing that is off by a radian",
@@ -2312,7 +2344,11 @@ CHAPTER = Chapter(
             metric=metrics.Numbers(1e-8),
             noisy=(
                 (estimate_without_error, metrics.Numbers(1e-8), "right, but not where the estimate is the truth:"),
-                (sharp_estimate, metrics.Numbers(1e-8), "right, but not for errors and uncertainties of millimeters:"),
+                (
+                    sharp_estimate,
+                    metrics.Numbers(1e-8),
+                    "right, but not for errors and uncertainties of millimeters, next to the origin of the map:",
+                ),
             ),
             hints=(
                 "Measure the error in units of the uncertainty the filter claims.",
