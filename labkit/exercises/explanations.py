@@ -59,7 +59,7 @@ class Explanations(Named):
         notebook = {name: self.function.__globals__[name] for name in read}
         tried = arguments.changes(self._names(self.inputs[0]), [case[0] for case in cases], notebook)
         reference = self.exercise.reference
-        if self._is_always_the_same() or self._holds_no_number():
+        if self._is_always_the_same() or self._holds_no_number() or self._one_truth():
             return None
         if all(isinstance(expected, str | bool | set | frozenset) for _, expected in self.pairs):
             tried = (pair for pair in tried if not arguments.SIZES.search(pair[0]))  # another size would do as well
@@ -147,7 +147,7 @@ class Explanations(Named):
         """Whether the results are those of a right formula with one change, with this in words."""
         if self.exercise.metric is None or not self.inputs or self._is_always_the_same() or self._is_told_apart():
             return None
-        if self._holds_no_number() or self._never_said():
+        if self._holds_no_number() or self._never_said() or self._one_truth():
             return None
         words = self._first_that_fits(slips.changed_formulas(self.exercise))
         return words and f"your result is what a right formula gives {words}"
@@ -171,6 +171,15 @@ class Explanations(Named):
         if len(lacking) > 1:
             return f"{', '.join(lacking[:-1])} and {lacking[-1]} came out on no draw, though each is right on some"
         return f"{lacking[0]} came out on no draw, though it is right on some" if lacking else None
+
+    def _one_truth(self):
+        """That arrays of truth values hold one of the two alone, which many a wrong computation gives."""
+        pairs = self._plain_pairs()
+        parts = [part for pair in pairs for part in pair]
+        if not all(isinstance(part, np.ndarray) and part.dtype.kind == "b" and part.ndim for part in parts):
+            return None
+        mine, right = ({bool(truth) for array in arrays for truth in array.flat} for arrays in zip(*pairs))
+        return f"every entry of your result is {mine.pop()}, on every draw" if len(mine) < len(right) else None
 
     def _is_told_apart(self):
         """Whether special draws alone are wrong of which the exercise says what they are: on a few draws of one kind
@@ -199,6 +208,8 @@ class Explanations(Named):
         draws = self._cases()
         if self.exercise.metric is None or not draws or not self.budget.left():
             return None
+        if words := self._one_truth():
+            return words
         told = dict.fromkeys(rerun.read_for_size(self.function), "uses only the size of")
         told |= dict.fromkeys(unread_arguments(self.function), "never uses")
         names = self._names(draws[0][0])

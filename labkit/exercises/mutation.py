@@ -86,6 +86,8 @@ SIZES = (
     "{}.shape[-1]",
     "len({0}) - {0}.shape[-1]",
 )  # what a number that is typed in may stand for
+COUNTING = {"num", "size", "shape"}  # keywords behind which a number counts something
+NO_COUNTS = {"polyfit", "swapaxes", "moveaxis", "roll", "diff", "matrix_power", "percentile", "quantile"}
 TURNED = {"sin": "cos", "cos": "sin"}
 TURNS = {90: "np.pi / 2", 180: "np.pi", 360: "2 * np.pi"}
 ROUNDING = ("round", "around")
@@ -356,8 +358,6 @@ def mending(function):
     found = changes(function)
     narrower = list(_narrower(function, found))
     found = [change for change in found if not any(change is other for other in narrower)]
-    meant = {*_digits_left(function), *_not_repeated(function)}
-    found = [change for change in found if change.place not in meant]
     found += _with_an_axis(function)
     found = [*_finer(function), *found, *_counted_by_loops(function), *_everywhere(found)]
     found += [*_finer_differences(function), *_with_an_outer_product(function), *_of_rounds(function)]
@@ -377,7 +377,8 @@ def mending(function):
     found += _lost_signs(function)
     found += _of_diagonals(function)
     found += _sizes(function)
-    return sorted(found, key=lambda change: change.rank)
+    meant = {*_digits_left(function), *_not_repeated(function)}
+    return sorted((change for change in found if change.place not in meant), key=lambda change: change.rank)
 
 
 def _digits_left(function):
@@ -675,7 +676,8 @@ def _typed_numbers(function):
     read = {n.id for n in ast.walk(function) if isinstance(n, ast.Name)}
     unread, alike = [name for name in given if name not in read], {}
     for owner, field, content, i, node in _typed(function):
-        sizes = [form.format(name) for name in given for form in SIZES if type(node.value) is int and node.value > 1]
+        counts = type(node.value) is int and node.value > 1 and not _is_no_count(owner)
+        sizes = [form.format(name) for name in given for form in SIZES if counts]
         turns = [TURNS[node.value]] if node.value in TURNS else []
         for text in (*unread, *turns, *sizes):
             new = ast.copy_location(ast.parse(text, mode="eval").body, node)
@@ -689,6 +691,13 @@ def _typed_numbers(function):
         if sets := _together(group):
             mends = f"{number} is typed in where `{text}` belongs, here and where it stands again"
             yield Change("", mends, TYPED, group[0].place, sets)
+
+
+def _is_no_count(owner):
+    """Whether a number of this owner says which axis, order, power or percentage, as far as its name tells."""
+    if isinstance(owner, ast.keyword):
+        return owner.arg not in COUNTING
+    return isinstance(owner, ast.Call) and getattr(owner.func, "attr", "") in REDUCTIONS | NO_COUNTS
 
 
 def _typed(function):

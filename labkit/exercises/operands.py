@@ -109,7 +109,7 @@ def _sizes(numeric):
             of = f"the {'number of entries' if values[0].ndim == 1 else 'number of rows'} of {here}"
             yield from _positive(of, counts)
             yield from _positive(f"one less than {of}", counts - 1)
-            yield from _positive(f"n / (n - 1), n {of},", counts / np.maximum(counts - 1, 1e-9))
+            yield from _positive(f"n / (n - 1) (n: {of})", counts / np.maximum(counts - 1, 1e-9))
         if all(v.ndim == 1 for v in values):
             yield from _positive(f"the length (norm) of {here}", [np.linalg.norm(v) for v in values])
             yield from _positive(f"the sum of {here}", [v.sum() for v in values])

@@ -21,7 +21,7 @@ WORDLESS = {  # what is raised without a word
 }
 ADVICE = {  # what NumPy means, by a regular expression
     r"string to float: .*'[-+\d]*,": "`float` reads 1.5, but not 1,5: replace a decimal comma by a point first.",
-    "must be square": "`solve` and `inv` need as many equations as unknowns; `lstsq` takes more.",
+    "must be square": "`solve`, `inv` and `det` take square matrices; `lstsq` takes more equations than unknowns.",
     "Singular matrix": "The equations do not fix all unknowns: is one missing, or there twice? Has a loop run off?",
     "Incompatible dimensions": "`lstsq` needs one right side a row of the matrix: is `.ravel()` missing?",
     "mismatch in its core dimension": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",

@@ -223,9 +223,8 @@ def _without_sign(metric, results, expected):
 
 def _thousand(unit):
     """Which two units a factor of a thousand may have confused."""
-    units = {"s": "ms against s", "rad": "mrad against rad", "mrad": "mrad against rad"}
-    if unit in ("", "mm", "m"):
-        return ": mm against m?"
+    units = {"s": "ms against s"} | dict.fromkeys(("rad", "mrad"), "mrad against rad")
+    units |= dict.fromkeys(("mm", "m"), "mm against m") | {"": "are two units mixed up"}
     return f": {units[unit]}?" if unit in units else ""
 
 

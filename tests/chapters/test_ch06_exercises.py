@@ -342,3 +342,59 @@ def test_where_the_largest_offset_is_wide_the_default_finds_another_lag(sign):
         time, reference, delayed, most = ch06.speed_curves(np.random.default_rng(seed), sign, wide=True)
         found = ch06.time_offset(time, reference, delayed)
         assert abs(found - ch06.time_offset(time, reference, delayed, most)) > 1e-2
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.802 / 3000])
+def test_a_turn_that_hardly_shows_makes_as_much_as_the_noise(turn):
+    text = ITEMS["knock"].judge(turn).text
+    assert "about 0.014 mm, no more than the noise, not 0.802 mm" in text
+
+
+def distinct(M):
+    s = np.unique(np.linalg.svd(M)[1].round(9))
+    return s[1] / s[-1]
+
+
+def all_of_them(values, factor):
+    s = 0 * np.median(np.abs(values - np.median(values)))
+    return np.ones(len(values), bool) if s == 0 else np.abs(values - np.median(values)) <= factor * s
+
+
+def from_one_to_another(order):
+    def found(speed, error):
+        first, last = order(speed)[[0, -1]]
+        return error[first], np.sqrt(abs(error[last] ** 2 - error[first] ** 2)) / speed[last]
+
+    return found
+
+
+@pytest.mark.parametrize(
+    "name, answer, said, unsaid",
+    [
+        ("singular_value_ratio", distinct, "all motions turn about one axis", "typed in"),
+        ("reject_outliers", all_of_them, "every entry of your result is True, on every draw", "were 0"),
+        (
+            "reject_outliers",
+            lambda v, f: ch06.reject_outliers(v, min(f, 1)),
+            "You allow one standard deviation",
+            "missing",
+        ),
+        ("static_error_and_lag", from_one_to_another(lambda v: np.arange(len(v))), "error of the first reading", "off"),
+        ("static_error_and_lag", from_one_to_another(np.argsort), "error of the slowest reading", "off"),
+    ],
+)
+def test_what_is_told_of_a_wrong_answer_is_true_of_it(name, answer, said, unsaid):
+    told = texts(name, answer)
+    assert all(said in text and unsaid not in text for text in told), told
+
+
+def test_a_lead_of_nearly_all_that_is_looked_for_is_asked_for():
+    def late(time, reference, delayed, max_offset):
+        found, step = ch06.time_offset(time, reference, delayed, max_offset), time[1] - time[0]
+        return abs(found) if abs(found) > max_offset - step else found
+
+    assert all("by nearly as much" in text for text in texts("time_offset", late))
+
+
+def test_six_equal_numbers_are_no_heights():
+    assert "last row of a pose" in ITEMS["spread"].judge(0.0).text

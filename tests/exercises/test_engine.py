@@ -317,7 +317,7 @@ def test_seeding_numpy_does_not_fix_the_draws():
     "change, words",
     [
         (lambda v: -2 * v, "right up to its sign"),
-        (lambda v: 2000 * v, "a thousand times the expected one: mm against m?"),
+        (lambda v: 2000 * v, "a thousand times the expected one: are two units mixed up?"),
         (lambda v: 4 * v, "twice the expected one"),
         (lambda v: v, "half the expected one"),
         (lambda v: np.rad2deg(2 * v), "180/pi times the expected one, as if it were converted to degrees"),

@@ -288,9 +288,13 @@ def _knock(course="after stop 10"):
 
 
 def _e_trans_of_a_turn(turn):
-    """What E_trans a turn after stop 10 makes, as a sentence."""
+    """What E_trans a turn after stop 10 makes, as a sentence; that of the figure, which begins with some noise."""
+    from .stages import compute_moved_station  # with its figures, which the other exercises do without
+
+    made, noise = (compute_moved_station({"tilt": t, "when": "after stop 10"})["E_trans"] for t in (turn, 0.0))
+    told = f"A turn of {turn:.3g} mrad after stop 10 makes an E_trans of about {made:.2g} mm"
     printed = 1000 * table_d().mean[COLUMNS.index("E_trans")]
-    return f"A turn of {turn:.3g} mrad after stop 10 makes an E_trans of about {printed * turn / _knock():.2g} mm, not {printed:.3f} mm"
+    return f"{told}{', no more than the noise' if made < 1.5 * noise else ''}, not {printed:.3f} mm"
 
 
 # Errors over speed -----------------------------------------------------------------------------------------------------------
@@ -345,6 +349,16 @@ def _extremes_alone(speed, error):
     """The law through the slowest reading and the fastest."""
     order = np.argsort(speed)
     return _ends_alone(speed[order], error[order])
+
+
+def _beside_one_reading(order):
+    """e0 as the error of one reading, and the lag that another one then has; `order` puts these two at the ends."""
+
+    def variant(speed, error):
+        first, last = order(speed)[[0, -1]]
+        return float(error[first]), float(np.sqrt(abs(error[last] ** 2 - error[first] ** 2)) / speed[last])
+
+    return variant
 
 
 def _fitted_to_errors(speed, error):
@@ -797,6 +811,18 @@ SPEEDS = [
                 _extremes_alone,
                 "You use the slowest reading and the fastest alone, with all their noise. A least-squares line takes all of them.",
                 id="static_error_and_lag-extremes",
+            ),
+            *(
+                Mistake(
+                    _beside_one_reading(order),
+                    f"Your e0 is the error of the {one} reading, and the lag follows from the {other} alone. Each has its noise: a least-squares line "
+                    "takes all of them, and its intercept is e0^2.",
+                    id=f"static_error_and_lag-{one}-and-{other}",
+                )
+                for one, other, order in (
+                    ("first", "last", lambda speed: np.arange(len(speed))),
+                    ("slowest", "fastest", np.argsort),
+                )
             ),
             Mistake(
                 _fitted_to_errors,

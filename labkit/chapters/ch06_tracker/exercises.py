@@ -537,6 +537,18 @@ def periodic_curves(rng):
     return time, curve(time), curve(time - lag), (period - near - 6) * step
 
 
+def curves_at_the_limit(rng):
+    """Curves of which the later one leads, by nearly as much as is looked for: the best of all shifts is the first."""
+    step, samples, phase = 0.01, int(rng.integers(12, 20)), rng.uniform(0, 6, 2)
+    time = rng.uniform(1, 50) + step * np.arange(int(rng.integers(200, 240)))
+
+    def curve(t):
+        return 1.2 + 0.6 * np.sin(4.1 * t + phase[0]) + 0.3 * np.sin(7.3 * t + phase[1])
+
+    lead = (samples - rng.choice([0.27, 0.33])) * step
+    return time, curve(time), curve(time + lead), (samples + 0.2) * step
+
+
 def noisy_curves(rng):
     """Curves that noise nearly hides, and a third of their length as the largest offset: the sum of the squared
     differences is least where few samples overlap, their mean near the truth.
@@ -835,7 +847,9 @@ CHAPTER = Chapter(
                 Mistake(_link("ZDAX", theta=-1), "theta has the wrong sign: check the entries with sin(theta)."),
                 Mistake(
                     _link("DAZX"),
-                    "You moved along x before turning about z, so the step a ignores theta. The last column begins with a cos(theta), a sin(theta).",
+                    "The step a ignores theta, as it does where the way along x comes before the turn about z. The last column begins with a cos(theta), "
+                    "a sin(theta).",
+                    id="dh_matrix-bd3295",
                 ),
                 Mistake(
                     _moved_last,
@@ -1005,8 +1019,8 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         variant,
-                        "For stacked columns this says A X = X B^T. B is to stand there once as it is: vec(X B) = (B^T kron I) vec(X), and "
-                        "vec(A X B^T) = (B kron A) vec(X).",
+                        "For stacked columns this says A X = X B^T, and A X = X B is meant. vec(X B) is (B^T kron I) vec(X), and vec(A X B^T) is "
+                        "(B kron A) vec(X): B is transposed in one of them alone.",
                         id=id,
                     )
                     for id, variant in (
@@ -1160,11 +1174,12 @@ CHAPTER = Chapter(
                 ),
                 *(
                     Mistake(
-                        lambda M, keep=keep: _by_qr(M, keep),
-                        "QR keeps the direction of the first column and bends the others to fit. The nearest rotation treats all alike: "
+                        lambda M, signed=signed: _by_qr(M, signed),
+                        "The first column keeps its direction and the others are bent to fit, as by QR or Gram-Schmidt. The nearest rotation treats all alike: "
                         "U @ Vt of a second SVD.",
+                        id=f"rotation_from_nullvector-5facee{words}",
                     )
-                    for keep in (True, False)
+                    for signed, words in ((True, ""), (False, "-2"))
                 ),
                 *(
                     Mistake(
@@ -1416,7 +1431,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda M: np.linalg.norm(M.T @ M @ _null(M, 0)) / (len(M) / 9 - 1),
-                    "This is the largest singular vector. The null vector is the last row of Vt.",
+                    "This comes of the largest singular value, or its vector. The null vector is the last row of Vt.",
+                    id="e_rot-3dc217",
                 ),
                 Mistake(
                     lambda M: e_rot(M) * (len(M) / 9 - 1),
@@ -1640,7 +1656,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda v, f: reject_outliers(v, 1.0),
-                    "`factor` is missing: you allow one standard deviation.",
+                    "You allow one standard deviation. How many they are, `factor` says.",
+                    id="reject_outliers-013298",
                 ),
                 *(
                     Mistake(
@@ -1835,6 +1852,11 @@ CHAPTER = Chapter(
                     id="spread-rotation",
                 ),
                 Mistake(
+                    lambda: 0.0,
+                    "All six have the same number there, as in the last row of a pose. The height z is `mountings[:, 2, 3]`.",
+                    id="spread-last-row",
+                ),
+                Mistake(
                     lambda: 1000 * np.sqrt(table_d().variance[2]),
                     "This is the spread of the report's runs. Wanted is that of the six in `mountings`.",
                 ),
@@ -1886,6 +1908,13 @@ CHAPTER = Chapter(
                     periodic_curves,
                     metrics.Numbers(6e-4, "s"),
                     "Right where the curves match at one shift. Where they repeat, and match at one within max_offset and at another beyond it:",
+                ),
+                (
+                    curves_at_the_limit,
+                    metrics.Numbers(
+                        6e-3, "s"
+                    ),  # half a sample: to one side of the first shift there is none for a parabola
+                    "Right for offsets well within max_offset. For a tracker that leads by nearly as much:",
                 ),
                 (
                     noisy_curves,
