@@ -23,7 +23,7 @@ ADVICE = {  # what NumPy means, by a regular expression
     r"string to float: .*'[-+\d]*,": "`float` reads 1.5, but not 1,5: replace a decimal comma by a point first.",
     "must be square": "`solve`, `inv` and `det` take square matrices; `lstsq` takes more equations than unknowns.",
     "Singular matrix": "The equations do not fix all unknowns: is one missing, or there twice? Has a loop run off?",
-    "Incompatible dimensions": "`lstsq` needs one right side a row of the matrix: is `.ravel()` missing?",
+    "Incompatible dimensions": "`lstsq` needs as many numbers on the right as the matrix has rows: see `.ravel()`.",
     "mismatch in its core dimension": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
     "not aligned": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
     "can be converted to Python scalars": "`math` and `float` take one number; `np.sin` and the like take arrays.",

@@ -32,6 +32,8 @@ def shape_words(results, expected, names=()):
     results, expected = list(map(_numbers, results)), list(map(_numbers, expected))
     if any(x is None for x in (*results, *expected)):
         return None
+    if all(x.size == 1 for x in (*results, *expected)):  # one number in brackets, as its refusal says
+        return None
     for words, change in _less():
         if _holds(results, expected, lambda r, e, change=change: (r, change(e))):
             return f"what you return is {words}"
@@ -60,7 +62,8 @@ def strange_size(said, args):
     if len(strange) != 1 or len(unfit) != 2:
         return ""
     size = f"no argument of this call has a size of {strange.pop()}"
-    return f"Entry by entry these shapes do not fit, and {size}: is it typed in, is an entry too many or missing?"
+    made = "does a function give so many, " if any(isinstance(arg, types.FunctionType) for arg in args) else ""
+    return f"Entry by entry these shapes do not fit, and {size}: {made}is it typed in, is an entry too many or missing?"
 
 
 def _sizes_of(value):

@@ -754,10 +754,16 @@ class Search:
         return [k for k in steps if k not in inner and not self._is_filled(k)]
 
     def _has_counterpart(self, k, solution):
-        """Whether the solution has a value of this kind that is none of the student's: the one that this should be."""
+        """Whether the solution has a value of this kind that is none of the student's: the one that this should be. One
+        that has it up to a factor may well be right: the factor can follow.
+        """
         mine = [values[k] for values in self.values]
+        if any(_are_proportional(mine, [values[q] for values in solution.values]) for q in solution.distinct):
+            return False
         for q in solution.distinct:
             theirs = [values[q] for values in solution.values]
+            if _are_whole(mine) != _are_whole(theirs):  # counts and labels, say, where lengths are meant
+                continue
             lacking = not any(
                 self._is_value(other, [t for _, t in theirs]) for other in range(len(self.written.places))
             )
@@ -1017,6 +1023,21 @@ def _exchangeable(mine, theirs):
     """Whether a value of the solution can take the place of one of the student's, and is another."""
     a, (_, b) = mine[1], _in_rounds(mine, theirs)
     return _fits(mine, theirs) and not _same(a, np.broadcast_to(b, a.shape))
+
+
+def _are_proportional(mine, theirs):
+    """Whether values on the way are those of the solution times one factor, the same on all draws."""
+    if any(a.shape != b.shape for (_, a), (_, b) in zip(mine, theirs)):
+        return False
+    a, b = (np.concatenate([values.ravel() for _, values in side]) for side in (mine, theirs))
+    if not b.any():
+        return False
+    largest = np.abs(b).argmax()
+    return _same(a, a[largest] / b[largest] * b)
+
+
+def _are_whole(values):
+    return all((numbers == np.round(numbers)).all() for _, numbers in values)
 
 
 def _fits(mine, theirs):

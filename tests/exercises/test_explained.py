@@ -368,7 +368,11 @@ def test_of_two_results_the_right_one_is_told():
     "said, args, told",
     [
         ("operands could not be broadcast together with shapes (5,) (2,) ", (np.ones(5), 0.1, len), None),
-        ("operands could not be broadcast together with shapes (5,) (2,) ", (np.ones(5), 0.1, exercise), "size of 2:"),
+        (
+            "operands could not be broadcast together with shapes (5,) (2,) ",
+            (np.ones(5), 0.1, exercise),
+            "size of 2: does a function give so many, is it typed in",
+        ),
         ("operands could not be broadcast together with shapes (4,3) (5,3) ", ([np.ones((4, 3))], "a"), "size of 5:"),
         ("could not broadcast input array from shape (3,) into shape (2,)", (np.ones((7, 3)),), "size of 2:"),
         ("operands could not be broadcast together with shapes (6,) (2,) ", (np.ones((2, 3)),), None),

@@ -441,6 +441,15 @@ def test_an_entry_of_a_right_value_is_right():
     assert "`w = u + v` in line 3 is the first" in search.agreement_words(solution)
 
 
+@pytest.mark.parametrize("bound", ["w = 0.2 * (a[0] + a[1])", "w = np.argmin(b) + 1"])
+def test_what_has_no_counterpart_or_lacks_a_factor_is_not_said_to_be_first(bound):
+    body = f"u = a - b\n{bound}\nreturn abs(w)"
+    search = steps.search(typed(body), ["a", "b"], _cases(), None, Budget(1.0))
+    right = typed("u = a - b\nw = a[0] + a[1]\nreturn w * b[2]")
+    solution = steps.Solution(rerun.written(right), search.cases, Budget(1.0))
+    assert search.agreement_words(solution) == "As far as `u` (line 2) your values are those of the solution"
+
+
 def _cases():
     rng = np.random.default_rng(0)
     draws = [(rng.normal(size=3), rng.normal(size=3)) for _ in range(4)]

@@ -8,6 +8,7 @@ import pytest
 from labkit.chapters.ch01_frames.exercises import CHAPTER as FRAMES
 from labkit.chapters.ch03_quirlen.exercises import CHAPTER as PIVOT
 from labkit.chapters.ch04_optimization.exercises import CHAPTER as WELLS
+from labkit.chapters.ch05_hand_eye.exercises import CHAPTER as HAND_EYE
 from labkit.chapters.ch06_tracker.exercises import CHAPTER as TRACKER
 from labkit.exercises.outcome import CORRECT, NOT_YET
 from labkit.exercises.whole import QUARTER_TURNS, whole
@@ -35,6 +36,10 @@ def moved_in_a_copy(f, x, h):
         behind[k] -= h
         slopes.append((f(ahead) - f(behind)) / (2 * h))
     return np.array(slopes)
+
+
+def rows_behind_one_another(function, x, step):
+    return np.transpose(moved_in_a_copy(function, x, step))
 
 
 def of_the_kind_of_all(theta, d, a, alpha):
@@ -88,6 +93,7 @@ def test_what_is_right_or_stops_by_itself_is_taken():
 def test_an_argument_may_be_left_out_with_a_reason():
     decimals = replace(NORMALIZE, decimals={"v": "a reason"})
     assert judged(decimals, like_the_given).status == CORRECT
+    assert judged(HAND_EYE["numeric_jacobian"], rows_behind_one_another).status == CORRECT  # x: floats, as it says
 
 
 def test_what_is_wrong_for_the_same_numbers_with_a_decimal_point_is_told_no_cause():

@@ -408,6 +408,16 @@ def _circle(change):
     return variant
 
 
+def _circle_of_parabola(x, z, at_apex):
+    """The circle that a parabola fitted to the points has at its apex, or at the middle of the points."""
+    a, b, c = np.polyfit(x - x.mean(), z, 2)
+    away = -b / (2 * a) if at_apex else 0.0
+    slope = 2 * a * away + b
+    r = (1 + slope**2) ** 1.5 / (2 * a)
+    right_angle = np.array([-slope, 1.0]) / np.hypot(slope, 1)
+    return x.mean() + away + r * right_angle[0], (a * away + b) * away + c + r * right_angle[1], abs(r)
+
+
 def _circle_about_mean(x, z):
     return x.mean(), z.mean(), np.hypot(x - x.mean(), z - z.mean()).mean()
 
@@ -581,6 +591,11 @@ def _weights(change):
     return variant
 
 
+def _weights_of_coordinates(residuals, together):
+    """Weights of the coordinates by their own scale, three of them made one."""
+    return together(_tukey(np.abs(residuals) / (5 * np.median(np.abs(residuals)) / 0.6745)), axis=1)
+
+
 def _tukey(u):
     return np.where(u < 1, (1 - u**2) ** 2, 0)
 
@@ -589,6 +604,10 @@ def find_misprints(entries):
     """Reference of the exercise: the first explanation of every suspicious row."""
     found = misprints.find(entries)
     return {(slips[0].table, slips[0].pose, slips[0].column) for slips in found.values() if slips}
+
+
+def _printed_misprints():
+    return {(row["table"], row["pose"], row["column"]) for row in thesis.corrections()}
 
 
 def _by_plain_least_squares(entries):
@@ -961,6 +980,9 @@ CHAPTER = Chapter(
                         "a3 entered the radius with the wrong sign: r^2 = xc^2 + zc^2 - a3, where a3 is xc^2 + zc^2 - r^2.", id="fit_circle-aa6121"),
                 *(Mistake(_circle_from_its_extent(depth), "Half of the width that is seen is no radius: the scan line is an arc, less than half of the circle.", id=id)
                   for id, depth in (("", lambda z, u, r: z.min() + r), ("circle-extent-mean", lambda z, u, r: np.mean(z + np.sqrt(np.maximum(r * r - u * u, 0)))))),
+                *(Mistake(functools.partial(_circle_of_parabola, at_apex=at_apex),
+                          "This circle has the curvature of a parabola through the points. An arc bends more strongly than that toward its ends: fit the circle itself.",
+                          id=f"circle-parabola-{at_apex + 1}") for at_apex in (True, False)),
                 Mistake(_circle_about_mean, "You took the mean of the points for the center. An arc lies on one side of its center."),
                 Mistake(_circle(lambda x, z, r: (z, x, r)), "The two coordinates of the center have changed places."),
                 Mistake(_circle_through(lambda n: [0, 1, 2]), "The circle goes through the first three points. All points of the scan line count."),
@@ -1106,6 +1128,7 @@ CHAPTER = Chapter(
             reference=_central,
             draw=(smooth_function, functools.partial(smooth_function, m=1), functools.partial(smooth_function, n=1)),
             metric=metrics.Numbers(1e-9),
+            decimals={"x": "the docstring says floats"},
             noisy=tuple(
                 (functools.partial(smooth_function, **special), metrics.Numbers(tol, least=least), words)
                 for special, tol, least, words in SPECIAL_FUNCTIONS
@@ -1119,7 +1142,7 @@ CHAPTER = Chapter(
                 Mistake(_forward, "This is the forward difference of listing C4, off by h f''/2. Take the step in both directions."),
                 Mistake(_backward, "This is the backward difference. Take the step in both directions."),
                 Mistake(lambda f, x, h: _central(f, x, h) * h * h, "`/ 2 * step` divides by 2 and then multiplies by the step: write / (2 * step)."),
-                Mistake(lambda f, x, h: _central(f, x, 1e-6), "You chose a step of your own. Use the argument `step`: the figure below varies it."),
+                Mistake(lambda f, x, h: _central(f, x, 1e-6), "This is what a far smaller step than `step` gives, or the derivative itself. Use the argument `step`: the figure below varies it.", id="numeric_jacobian-dce1a6"),
                 Mistake(lambda f, x, h: (f(x + h) - f(x - h)) / (2 * h), "You moved all variables at once. Move one at a time: one column each."),
                 Mistake(lambda f, x, h: -_central(f, x, h),
                         "The sign is reversed: what is ahead minus what is behind."),
@@ -1132,6 +1155,9 @@ CHAPTER = Chapter(
                     "This steps to complex places: where a function takes them that is a derivative too, but no central difference. Step to both sides of x.",
                     id="numeric_jacobian-complex",
                 ),
+                *(Mistake(lambda f, x, h, small=small: (4 * _central(f, x, h * small) - _central(f, x, 2 * h * small)) / 3,
+                          "Here differences of two steps are put together, so that their first errors cancel (Richardson). Asked for is the one central difference, a whole step to each side.",
+                          id=f"numeric_jacobian-richardson-{small:g}") for small in (1, 0.5)),
                 Mistake(lambda f, x, h: 2 * _central(f, x, h), "Between ahead and behind lie two steps: divide by 2 h."),
                 Mistake(lambda f, x, h: _central(f, x, h) * 2 * h, "You have not divided by the distance 2 h yet."),
                 Mistake(lambda f, x, h: _central(f, x, h).T, "Your matrix is the transpose: one row a function value, one column a variable."),
@@ -1405,6 +1431,9 @@ CHAPTER = Chapter(
                         "These are third powers (tricube). Tukey's biweight has squares: (1 - u^2)^2."),
                 Mistake(lambda e: _tukey(np.abs(e) / (5 * np.median(np.abs(e)) / robust.MEDIAN_CHI3)),
                         "This weighs each coordinate. A pose is good or bad as a whole: one weight per pose, from the length of its vector."),
+                *(Mistake(functools.partial(_weights_of_coordinates, together=together),
+                          "Here each coordinate has a weight, and the three are put together. A pose is good or bad as a whole: one weight, from the length of its vector.",
+                          id=f"robust_weights-coordinates-{together.__name__}") for together in (np.prod, np.min, np.mean)),
             ],
         ),
         Prediction(
@@ -1435,8 +1464,10 @@ CHAPTER = Chapter(
                 Mistake(_by_plain_least_squares, "This is all that a plain least-squares fit shows: its grossest slip bends it so far that the others hide. Fit robustly, and take every pose that stands out, not the worst alone.", id="find_misprints-389b20"),
                 Mistake(_too_strict, "You accuse poses that are merely noisy. Among 31 poses some exceed 2.5 standard deviations by chance; take 6."),
                 Mistake(_all_explanations, "You name every entry that could be changed. One slip per row: take the most credible explanation."),
-                Mistake(lambda entries: {(r["table"], r["pose"], r["column"]) for r in thesis.corrections()},
+                Mistake(lambda entries: _printed_misprints(),
                         "These are the seven of the printed tables. The check plants slips of its own: search the `entries` you are given."),
+                Mistake(lambda entries: {key for key in _printed_misprints() if entries[key] == thesis.printed_entries()[key]},
+                        "These are the misprints of the printed tables alone. The check plants slips of its own: fit the `entries` you are given, and search their rows.", id="find_misprints-printed"),
                 Mistake(lambda entries: {(table, pose - 1, column) for table, pose, column in find_misprints(entries)}, "Your poses are one too low: they count from 1, arrays from 0."),
                 Mistake(_first_alone, "You name one misprint, that of the first suspicious row. Does `return` stand inside the loop?", id="find_misprints-first"),
                 Mistake(_worst_alone, "You name one misprint, that of the row with the largest residual. Every row that stands out has one.", id="find_misprints-worst"),
@@ -1497,6 +1528,7 @@ CHAPTER = Chapter(
                 Mistake(lambda: 2 * _fitted_radius(),
                         "This is a diameter: half of it."),
                 Mistake(_radius_with_printed_target, "This radius fits best with the sphere's center held where the thesis has it. Free the center as well.", within=0.002, id="radius-center-held"),
+                Mistake(lambda: _rms_with_radius(_fitted_radius()), "This is the rms that the best radius leaves. Asked for is the radius at which it is the least.", within=0.001, id="radius-least-rms"),
                 Mistake(_std_of_radius, "This is the standard deviation of the radius. Asked for is the radius itself.", id="radius-std"),
                 Mistake(lambda: _radius_without(4), "Pose 4, next to the equator, is left out. Here all 31 corrected poses are asked.", within=0.001),
                 Mistake(_radius_with_pose_2_alone, "Only pose 2 is repaired in this fit. Use `corrected`.", within=0.001),
@@ -1557,7 +1589,7 @@ CHAPTER = Chapter(
 
 def _judge_printed(student):
     """The printed tables themselves must be among what is checked."""
-    wanted = {(r["table"], r["pose"], r["column"]) for r in thesis.corrections()}
+    wanted = _printed_misprints()
     named = named_entries().admit(student(thesis.printed_entries()), wanted)
     if named - wanted:
         return f"in the printed tables {sorted(named - wanted)[0]} is accused wrongly."
