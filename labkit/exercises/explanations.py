@@ -247,7 +247,7 @@ class Explanations(Named):
 
     def _by_chance(self):
         """That a result which is nearly right comes of random numbers, as one more sentence."""
-        drawn = RANDOM & set(getattr(getattr(self.function, "__code__", None), "co_names", ()))
+        drawn = RANDOM & scope.co_names(self.function)
         if not drawn or "rng" in self.exercise.arguments or isinstance(self.exercise.metric, metrics.Exactly):
             return ""
         numbers = [(numbers_of(r), numbers_of(e)) for r, e in self._plain_pairs()]

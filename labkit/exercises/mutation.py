@@ -711,7 +711,9 @@ def _typed(function):
 
 
 def _shorter_steps(function):
-    """Steps along a ray or in time, in a `while` that asks for what they add up to or in `np.arange`, made shorter."""
+    """Steps along a ray or in time, in a `while` that asks for what they add up to, in `np.arange` or in `np.linspace`,
+    made shorter.
+    """
     for owner in ast.walk(function):
         if isinstance(owner, ast.While):
             asked = {n.id for n in ast.walk(owner.test) if isinstance(n, ast.Name)}
@@ -722,6 +724,12 @@ def _shorter_steps(function):
                     yield from _with_a_part(step, "value", step.value)
         elif isinstance(owner, ast.Call) and getattr(owner.func, "attr", "") == "arange" and len(owner.args) == 3:
             yield from _with_a_part(owner, "args", owner.args[2])
+        elif isinstance(owner, ast.Call) and getattr(owner.func, "attr", "") == "linspace" and len(owner.args) == 3:
+            places = getattr(owner.args[2], "value", None)
+            for more in (10 * places, 30 * places) if type(places) is int else ():
+                new = ast.copy_location(ast.Constant(more), owner.args[2])
+                mends = f"{places} places are far too few: {more} will do"
+                yield Change("", mends, FINER, owner, ((owner, "args", [*owner.args[:2], new]),))
 
 
 def _with_a_part(place, field, step):

@@ -28,6 +28,7 @@ ADVICE = {  # what NumPy means, by a regular expression
     "not aligned": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
     "can be converted to Python scalars": "`math` and `float` take one number; `np.sin` and the like take arrays.",
     "inhomogeneous": "The parts of this array have different lengths.",
+    "return arrays must be of ArrayType": "`np.arctan` writes into what it is handed second: is `np.arctan2` meant?",
     "truth value of an array": "`if` takes one truth value; `np.where` chooses entry by entry.",
     "bitwise_xor": "`^` is no power in Python: write `**`.",
     r"for \^: ": "`^` is no power in Python: write `**`.",
@@ -97,7 +98,7 @@ class Raised(Explanations):
         if not args:
             return f"\nwhen given {run.error.given}" if hasattr(run.error, "given") else ""
         told = f"\nwhen called as {self._call(args)}"
-        if OWN_REFUSAL.match(run.line):
+        if OWN_REFUSAL.match(run.line) and not any(map(callable, args)):  # a function may well be wrong
             told += f"\n{IN_ORDER}"
         if self.pairs and all(m and m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)):
             told += f"\n{leading(words) or self._special_case(args) or self._before(args)}"

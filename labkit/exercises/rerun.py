@@ -167,6 +167,16 @@ def _iterated(tree):
             yield statement.lineno
 
 
+def _walked(tree):
+    """Lines of loops that go on in steps of their own, so that their values are those of no other way of going."""
+    for loop in ast.walk(tree):
+        made = isinstance(loop, ast.For) and any(
+            isinstance(n, ast.Attribute) and n.attr in ("arange", "linspace") for n in ast.walk(loop.iter)
+        )
+        if made or isinstance(loop, ast.While):
+            yield from range(loop.lineno, loop.end_lineno + 1)
+
+
 class Written:
     """A function that was read again, with the functions `beside` it, [(function, definition)], that it calls.
 
@@ -187,6 +197,16 @@ class Written:
     def iterated(self):
         """Lines in which a variable is bound that a loop makes anew of itself, or that a search begins with."""
         return {line for tree in self.trees for lines in (_iterated, _searched) for line in lines(tree)}
+
+    @functools.cached_property
+    def walked(self):
+        """Lines of loops that go on in steps of their own."""
+        return {line for tree in self.trees for line in _walked(tree)}
+
+    @functools.cached_property
+    def repeats(self):
+        """Whether something is done again and again until it is good enough."""
+        return any(isinstance(node, ast.While) for tree in self.trees for node in ast.walk(tree))
 
     @functools.cached_property
     def _changes(self):

@@ -161,6 +161,11 @@ def could_change(function):
     return list(dict.fromkeys([*filled, *_bound(function)]))
 
 
+def co_names(function):
+    """Names of globals and attributes that a function reads; none where it is not written in Python."""
+    return set(getattr(getattr(function, "__code__", None), "co_names", ()))
+
+
 def _bound(function):
     """Names of the notebook that a function binds."""
     code = getattr(function, "__code__", None)

@@ -69,7 +69,7 @@ class Staying(Evidence):
         cause = "Does something stay from call to call, a global variable or a default argument that is changed?"
         if names := self.defaults.changed_names:
             cause = f"It leaves {names} changed for the next call: does the result follow from that?"
-        if UNFILLED & set(getattr(getattr(self.function, "__code__", None), "co_names", ())):
+        if UNFILLED & scope.co_names(self.function):
             cause = f"Is each entry of what `np.empty` makes filled? {cause}"
         told = f"called {often} with the same arguments, your function {told} {at}"
         return f"{told}. {cause} Or is something drawn at random?"

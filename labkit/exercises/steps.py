@@ -743,6 +743,8 @@ class Search:
         if of_notebook < units[len(known)]:
             return told
         line, code, *_ = self.written.places[units[len(known)]]
+        if line in self.written.walked and not solution.repeats:
+            return told
         first = f"`{code}` in line {line} is the first behind that is not among them"
         return f"{told}; {first}. Look from there on, unless you go another way than it does"
 
@@ -992,7 +994,7 @@ class Solution:
     """The values on the way of the chapter's solution on the same draws."""
 
     def __init__(self, written, cases, budget):
-        self.places, self.values = written.places, _traces(written, cases, budget)
+        self.places, self.values, self.repeats = written.places, _traces(written, cases, budget), written.repeats
         kept = [q for q in range(len(self.places)) if all(values[q][0] for values in self.values)]
         self.distinct = []
         for q in kept:

@@ -11,6 +11,8 @@ from .results import Refusal
 from .staying import Staying
 from .wording import closed, leading
 
+INTO_SECOND = " `np.arctan(y, x)` writes into x: `np.arctan2` takes two."
+
 
 class Trial(Raised, Staying):
     """A function and what one check makes of it."""
@@ -43,7 +45,10 @@ class Trial(Raised, Staying):
             return told if endless else self._mended(told, args, metric, expected)
         if run.changed:
             names = ", ".join(f"`{name}`" for k, name in enumerate(self._names(args)) if k in run.changed)
-            return self.outcome(NOT_YET, f"your function changes its argument {names} in place: work on a copy.")
+            advice = INTO_SECOND if "arctan" in scope.co_names(self.function) else ""
+            return self.outcome(
+                NOT_YET, f"your function changes its argument {names} in place: work on a copy.{advice}"
+            )
         self.inputs.append(args)
         self.pairs.append((admitted[0], expected))
         self.metrics.append(metric)

@@ -396,6 +396,20 @@ def walked(first, step, share=1.0):
     return answer
 
 
+def mirrored(grid, pose, bearing, r_max):
+    return walked(0.0, None)(grid, pose, -2 * pose[2] - bearing, r_max)
+
+
+def by_the_arcsine(pose, z, landmarks, std_range, std_bearing):
+    d = landmarks - pose[:2]
+    bearing = np.arcsin(np.sin(z[:, 1] - np.arctan2(d[:, 1], d[:, 0]) + pose[2]))
+    return (norm.logpdf(z[:, 0] - np.hypot(*d.T), 0, std_range) + norm.logpdf(bearing, 0, std_bearing)).sum()
+
+
+def by_one_pair(x, u, dt, std_u, rng):
+    return odometry.step(x, rng.multivariate_normal(u, np.diag(std_u**2)), dt)
+
+
 def moved_by(u, std_u, m, rng):
     return u + std_u * rng.standard_normal((m, 2))
 
@@ -575,7 +589,7 @@ PASSED_BEFORE = [
     ("cast_ray", in_steps_along_x, "`sign` is too much"),
     ("cast_ray", in_steps_of_two_cells, "longer than a cell"),
     ("cast_ray", walked(1.0, None), "begin farther out"),
-    ("cast_ray", walked(0.0, None, share=0.9), "a little before r_max"),
+    ("cast_ray", walked(0.0, None, share=0.9), "a little before r_max: your ray ends"),
     ("cast_ray", walked(0.0, 0.05), "typed in"),
     ("resample_roulette", one_too_low, "one too low"),
     ("resample_roulette", drawn_by(np.square), "squares of the weights"),
@@ -602,7 +616,13 @@ PASSED_BEFORE = [
     ("sample_motion", laplace, "as Laplace numbers of this scale"),
     ("sample_motion", the_same_for_both, "what the standard deviation of v gives"),
     ("resample_systematic", counted, "counted how often each comes out"),
-    ("cast_ray", halved, "You return r_max where a wall is nearer."),
+    ("cast_ray", halved, "the ray is halved"),
+    ("cast_ray", mirrored, "the other way along y"),
+    ("cast_ray", walked(0.5, None), "some 20 cm away"),
+    ("landmark_weight", by_the_arcsine, "folded at 90 deg"),
+    ("circular_mean", lambda a, w: np.angle(np.sum(a * np.exp(1j * w))), "exchanged"),
+    ("sample_motion", by_one_pair, "moved alike"),
+    ("hunt_1", lambda resample, rng: [chi_square(resample, rng)] if resample in ch09.GOOD else False, "got list"),
 ]
 
 
@@ -621,6 +641,15 @@ def answer(grid, pose, bearing, r_max):
         if grid.at([pose[0] + k * step * np.cos(a), pose[1] + k * step * np.sin(a)]) == maps.OCCUPIED:
             return k
         k += 1
+    return r_max
+"""
+
+IN_THIRTY_PLACES = """
+def answer(grid, pose, bearing, r_max):
+    a = pose[2] + bearing
+    for r in np.linspace(0, r_max, 30):
+        if grid.at([pose[0] + r * np.cos(a), pose[1] + r * np.sin(a)]) == maps.OCCUPIED:
+            return r
     return r_max
 """
 
@@ -646,6 +675,7 @@ def typed(text):
     "name, text, words",
     [
         ("cast_ray", IN_NUMBERS_OF_STEPS, "it is to be multiplied by `step`"),
+        ("cast_ray", IN_THIRTY_PLACES, "30 places are far too few"),
         ("distance_field_weight", OF_ALL_ROWS_AND_COLUMNS, "`rows`, `columns` your values are those"),
     ],
 )

@@ -97,6 +97,17 @@ def test_a_refusal_of_what_is_in_order_is_said_to_be_one():
     assert "IndexError" in told and "in order" not in told
 
 
+def test_of_a_function_that_is_handed_over_it_is_not_said_that_nothing_is_to_be_refused():
+    def holds(function):
+        if function(1.0) == 1.0:
+            raise ValueError("caught")
+        return True
+
+    item = Exercise("holds", lambda function: True, lambda rng: (abs,), metrics.Exactly(), hints=("a", "b", "c"))
+    told = item.judge(holds, np.random.default_rng(0)).text
+    assert "caught" in told and "in order" not in told
+
+
 def test_what_is_wrong_without_it_is_told_as_ever():
     empty = []
 

@@ -194,6 +194,8 @@ class Hostile:
         (unprintable, RAISED, "Unprintable"),
         (huge_view, NOT_YET, "got one of shape (100000, 100000, 3)"),
         (mutating, NOT_YET, "changes its argument `v`"),
+        (lambda v: 2 * np.arctan(v, v), NOT_YET, "`np.arctan2` takes two"),
+        (lambda v: np.arctan(v, 2.0), RAISED, "is `np.arctan2` meant?"),
         (lambda v: None, TO_DO, ""),
         (lambda v: [] and v, NOT_YET, "expected an array of shape (3,), got shape (0,)"),
         (lambda v: np.full(3, np.nan), NOT_YET, "NaN in 3 of 3"),

@@ -670,6 +670,15 @@ def far_apart(rng):
     return rng.normal(size=3), rng.normal(size=3) + [0.0, 3.0, 0.0]
 
 
+def test_of_steps_of_its_own_none_is_told_to_be_the_first_that_disagrees(monkeypatch):
+    text = "def formula(a, b):\n    x = a * b\n    y = a + x\n    return x * y + np.exp(b)\n"
+    body = (
+        "x = a * b\nfor t in np.linspace(0, 1, 7):\n    y = np.sin(t * a) - 3 * x**2\nreturn x * y - 2 * np.exp(b) ** 3"
+    )
+    told = judged(asked(solved_by(monkeypatch, text), two_numbers), body)
+    assert "As far as `x` (line 2) your values are those of the solution." in told
+
+
 def test_what_agrees_ends_at_the_first_step_that_does_not(monkeypatch):
     text = "def formula(a, b):\n    x = a * b\n    y = a + x\n    z = np.exp(b)\n    return x * y + z\n"
     reference = solved_by(monkeypatch, text)
@@ -993,15 +1002,16 @@ def test_rounded_numbers_typed_lengths_and_cases_that_are_none_are_told(referenc
 
 
 @pytest.mark.parametrize(
-    "body",
+    "body, words",
     [
-        "t = 0.0\nwhile t < a:\n    t += 0.3\nreturn t",
-        "t = np.arange(0, 9, 3 * 0.1)\nreturn t[t >= a][0]",
+        ("t = 0.0\nwhile t < a:\n    t += 0.3\nreturn t", "are far too long: a hundredth of that will do"),
+        ("t = np.arange(0, 9, 3 * 0.1)\nreturn t[t >= a][0]", "are far too long: a hundredth of that will do"),
+        ("t = np.linspace(0, 3, 20)\nreturn t[t >= a][0]", "20 places are far too few: 600 will do"),
     ],
 )
-def test_steps_that_are_too_long_are_told(body):
+def test_steps_that_are_too_long_are_told(body, words):
     item = replace(asked(lambda a, b: a, lambda rng: rng.uniform(1, 2, 2)), metric=metrics.Numbers(0.01))
-    assert "are far too long: a hundredth of that will do" in judged(item, body)
+    assert words in judged(item, body)
 
 
 def test_too_long_a_step_of_differences_is_told_wherever_it_stands():

@@ -3,7 +3,7 @@
 import functools
 import inspect
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp, ndtr, ndtri
@@ -244,9 +244,9 @@ def ray_along_an_axis(rng, toward):
 
 def ray_past_the_unknown(rng):
     """A ray that crosses cells that nobody has seen before it meets a wall; they are no obstacle that is known."""
-    cells, start = np.full((60, 60), maps.FREE), rng.uniform(1.0, 1.5)
+    cells, start = np.full((60, 140), maps.FREE), rng.uniform(1.0, 1.5)
     cells[:, 25:35] = maps.UNKNOWN
-    cells[:, 50:] = maps.OCCUPIED
+    cells[:, 50:] = maps.OCCUPIED  # so thick that halving the ray finds its face
     theta = rng.uniform(-0.3, 0.3)
     return maps.OccupancyGrid(cells, 0.1), np.array([start, rng.uniform(2.8, 3.2), theta]), float(-theta), R_MAX
 
@@ -263,8 +263,8 @@ def ray_to_a_thin_wall(rng, width=0.1, far=None):
 
 
 def ray_in_a_fine_map(rng):
-    """The same with cells of 2 cm and a wall in which no step of 5 cm ends."""
-    return ray_to_a_thin_wall(rng, width=0.02, far=2.5 * rng.integers(9, 14) + rng.uniform(0.6, 0.9))
+    """The same with cells of 2 cm and a wall in which no step of 5 cm ends, more than half a meter away."""
+    return ray_to_a_thin_wall(rng, width=0.02, far=2.5 * rng.integers(11, 16) + rng.uniform(0.6, 0.9))
 
 
 def ray_down_a_hall(rng):
@@ -277,8 +277,8 @@ def ray_down_a_hall(rng):
 
 
 def ray_to_a_wall_close_by(rng):
-    """A ray to a wall less than half a meter away."""
-    cells, far = np.full((60, 60), maps.FREE), rng.uniform(0.2, 0.45)
+    """A ray to a wall so near that one which begins half a meter out is in it."""
+    cells, far = np.full((60, 60), maps.FREE), rng.uniform(0.15, 0.25)
     cells[:, 40:] = maps.OCCUPIED
     theta, angle = rng.uniform(-3, 3), rng.uniform(-0.3, 0.3)
     pose = np.array([4.0 - far * math.cos(angle), rng.uniform(2.5, 3.5), theta])
@@ -536,6 +536,18 @@ def headings_without_weight(rng):
     angles, weights = headings(rng, about=2.0)
     angles[::3], weights[::3] = -1.0, 0.0
     return angles, weights
+
+
+@dataclass(frozen=True)
+class Reach(metrics.Numbers):
+    """The length of a ray, and to which side it is wrong: what is too long has passed something."""
+
+    def deviations(self, result, expected):
+        (off,) = super().deviations(result, expected)
+        where = (
+            "behind what ends it first, an occupied cell or r_max" if result > expected else "before anything ends it"
+        )
+        return [replace(off, words=f"your ray ends {off.amount:.3g} m {where}")]
 
 
 # References that the library has in another form ---------------------------------------------------------------------
@@ -815,6 +827,12 @@ def _ranges_wrapped(pose, z, landmarks, std_range, std_bearing):
     return landmark_weight(pose, z, landmarks, std_range, std_bearing)
 
 
+def _bearings_folded(pose, z, landmarks, std_range, std_bearing):
+    bearings = np.arctan2(*(landmarks - pose[:2]).T[::-1]) - pose[2]
+    folded = np.column_stack([z[:, 0], bearings + np.arcsin(np.sin(z[:, 1] - bearings))])
+    return landmark_weight(pose, folded, landmarks, std_range, std_bearing)
+
+
 def _landmarks_that_fit_best(pose, z, landmarks, std_range, std_bearing):
     def best(reading):
         return max(landmark_weight(pose, reading[None], mark[None], std_range, std_bearing) for mark in landmarks)
@@ -951,6 +969,20 @@ def _ray_without_end(grid, pose, bearing, r_max):
 
 def _ray_reversed(grid, pose, bearing, r_max):
     return maps.walk_ray(grid, pose, -bearing, r_max)
+
+
+def _ray_mirrored(in_x, grid, pose, bearing, r_max):
+    ray = pose[2] + bearing
+    return maps.walk_ray(grid, np.array([*pose[:2], math.pi - ray if in_x else -ray]), 0.0, r_max)
+
+
+def _ray_by_halves(grid, pose, bearing, r_max):
+    near, far, angle = 0.0, r_max, pose[2] + bearing
+    while far - near > grid.resolution / 20:
+        middle = (near + far) / 2
+        hit = grid.at(pose[:2] + middle * np.array([math.cos(angle), math.sin(angle)])) == maps.OCCUPIED
+        near, far = (near, middle) if hit else (middle, far)
+    return far
 
 
 def _hits(grid, pose, bearing, r_max, step):
@@ -1495,7 +1527,9 @@ def _other_spread(name, noise, wanted, std_u, dt, longer):
     )
     if name == "in theta" and amount < 0.01 * wanted:
         return f"{told}. This was straight on, u = [1, 0]: omega has its noise there as well."
-    if amount > 0 and np.corrcoef(noise[:-1], noise[1:])[0, 1] > 0.5:
+    if amount < 1e-9 * wanted:
+        return f"{told}. All particles moved alike: draw a pair of random numbers for each."
+    if np.corrcoef(noise[:-1], noise[1:])[0, 1] > 0.5:
         return (
             f"{told}. The noise of each is like that of the one before: add its own to u itself, to each a fresh one."
         )
@@ -1729,17 +1763,18 @@ GOOD_WORDS = {
 }
 
 
-def _on_show(specimen):
-    """The specimen, with advice for a test that lets its exception through."""
+def _on_show(specimen, name):
+    """The specimen, with advice for a test that lets its exception through; under a name that gives nothing away."""
 
-    def resample(*args):
+    def shown(*args):
         try:
             return specimen(*args)
         except IndexError as error:
             advice = "raised by the specimen: let your test catch that, try: ... except IndexError: return False"
             raise IndexError(f"{error} ({advice})") from error
 
-    return resample  # under a name that gives nothing away
+    shown.__name__ = name
+    return shown
 
 
 RUNS = 3  # how often a property test is tried on each function: what passes by luck does so once
@@ -1749,14 +1784,18 @@ MORE_RUNS, QUICK = 6, 0.1  # how often on a correct one, if three take no more s
 def _catches(specimen, good, others, extra=()):
     """Properties of a property test: False for the specimen and the other wrong ones, True for what is correct."""
 
+    def verdict_on(function, test, rng):
+        verdict = test(function, *((rng,) if extra else ()))
+        if np.shape(verdict) == () and np.asarray(verdict).dtype == bool:
+            return bool(verdict)
+        return f"a test answers True (passed) or False (caught), got {type(verdict).__name__}."
+
     def rejects(wrong, words):
         def check(test, rng):
             for _ in range(RUNS):
-                verdict = test(wrong, *((rng,) if extra else ()))
-                if not isinstance(verdict, bool | np.bool_):
-                    return f"a test answers True (passed) or False (caught), got {type(verdict).__name__}."
-                if verdict:
-                    return words
+                verdict = verdict_on(wrong, test, rng)
+                if verdict is not False:
+                    return words if verdict is True else verdict
             return None
 
         return check
@@ -1767,8 +1806,11 @@ def _catches(specimen, good, others, extra=()):
             for run in range(MORE_RUNS):
                 if run >= RUNS and seconds() - begun > QUICK:
                     break
-                if not test(function, *((rng,) if extra else ())):
-                    ever = any(test(other, *((rng,) if extra else ())) for other in (function, *good))
+                verdict = verdict_on(function, test, rng)
+                if verdict not in (True, False):
+                    return verdict
+                if not verdict:
+                    ever = any(verdict_on(other, test, rng) is True for other in (function, *good))
                     more = "" if ever else " It says False of every correct function it is tried on."
                     often = "now and then also rejects" if run else "also rejects"
                     return f"your test {often} a correct function ({GOOD_WORDS[function]}): it asks for more than must hold.{more}"
@@ -1836,7 +1878,10 @@ def _sorted_first(weights, rng):
 
 
 def _lightest_left_out(weights, rng):
-    left = np.where(weights > weights.min(), weights, 0.0)
+    """The lightest quarter never comes out, nor what weighs as little: of many particles a single one no test misses."""
+    living = weights[weights > 0]
+    light = np.quantile(living, 0.25, method="lower")
+    left = np.where(weights > (light if light < weights.max() else living.min()), weights, 0.0)
     return particles.resample_roulette(left if left.any() else weights, rng)
 
 
@@ -1880,7 +1925,7 @@ def hunt_4(weigh):
 
 
 def _hunt(id, reference, specimen, why, hints, others, good=GOOD, extra=("rng",), named=""):
-    specimen = _on_show(specimen)
+    specimen = _on_show(specimen, next(iter(inspect.signature(reference).parameters)))
     return Exercise(
         id,
         reference=reference,
@@ -2035,6 +2080,10 @@ CHAPTER = Chapter(
                 Mistake(
                     _landmarks(wrap="positive"),
                     "A small negative error became one near 360 deg. Wrap the difference to [-pi, pi).",
+                ),
+                Mistake(
+                    _bearings_folded,
+                    "Your bearing errors are folded at 90 deg, as np.arcsin folds: 170 deg counts as 10 deg. planar.wrap_angle keeps them.",
                 ),
                 Mistake(
                     _landmarks(wrap="quotient"),
@@ -2241,45 +2290,45 @@ CHAPTER = Chapter(
             reference=maps.walk_ray,
             draw=(*EVERY_WAY, ray_past_the_unknown),
             fixed={"pose": POSE},
-            metric=metrics.Numbers(0.16, "m", absolute=True),
+            metric=Reach(0.16, "m", absolute=True),
             noisy=[
                 (
                     short_ray,
-                    metrics.Numbers(0.16, "m", absolute=True),
+                    Reach(0.16, "m", absolute=True),
                     "Right on rays to a wall with r_max = 18 m, but not on one whose r_max ends before any wall:",
                 ),
                 (
                     ray_to_a_thin_wall,
-                    metrics.Numbers(0.16, "m", absolute=True),
+                    Reach(0.16, "m", absolute=True),
                     "Right on other rays, but not on one nearly along y to a wall of one cell (is a step longer than a cell, or does it "
                     "get longer there?):",
                 ),
                 (
                     ray_that_just_arrives,
-                    metrics.Numbers(0.16, "m", absolute=True),
+                    Reach(0.16, "m", absolute=True),
                     "Right on other rays, but not on one that meets a wall a little before r_max:",
                 ),
                 (
                     ray_to_a_wall_close_by,
-                    metrics.Numbers(0.16, "m", absolute=True),
-                    "Right on longer rays, but not on one to a wall less than half a meter away (does yours begin farther out?):",
+                    Reach(0.16, "m", absolute=True),
+                    "Right on longer rays, but not on one to a wall some 20 cm away (does yours begin farther out?):",
                 ),
                 (
                     ray_down_a_hall,
-                    metrics.Numbers(0.16, "m", absolute=True),
+                    Reach(0.16, "m", absolute=True),
                     "Right on shorter rays, but not on one to a wall some 20 m away that r_max = 25 m reaches (does yours end sooner?):",
                 ),
                 *(
                     (
                         functools.partial(ray_along_an_axis, toward=toward),
-                        metrics.Numbers(0.16, "m", absolute=True),
+                        Reach(0.16, "m", absolute=True),
                         f"Right on other rays, but not on one straight {against} on a map that begins elsewhere than at (0, 0):",
                     )
                     for toward, against in ((math.pi, "against x"), (-math.pi / 2, "against y"))
                 ),
                 (
                     ray_in_a_fine_map,
-                    metrics.Numbers(0.05, "m", absolute=True),
+                    Reach(0.05, "m", absolute=True),
                     "Right on other maps, but not on one with cells of 2 cm and a wall of one cell (is the length of a step typed in? "
                     "grid.resolution is the width of a cell):",
                 ),
@@ -2305,10 +2354,21 @@ CHAPTER = Chapter(
                     _ray_reversed, "Bearings count to the left, like angles: theta + bearing, not theta - bearing."
                 ),
                 Mistake(_ray_swapped, "Sine and cosine have changed places: x goes with the cosine."),
+                *(
+                    Mistake(functools.partial(_ray_mirrored, in_x), f"Your ray goes the other way along {axis}: {way}.")
+                    for in_x, axis, way in (
+                        (False, "y", "y grows upward, y + r * np.sin(angle)"),
+                        (True, "x", "x + r * np.cos(angle)"),
+                    )
+                ),
                 Mistake(
                     lambda grid, x, b, r_max: r_max,
                     "You return r_max where a wall is nearer. Is `return r_max` inside the loop, a step longer than a cell is wide, or do you look at few places of the ray only?",
                     id="cast_ray-839415",
+                ),
+                Mistake(
+                    _ray_by_halves,
+                    "That is what comes out when the ray is halved again and again. It finds the first wall only where all behind it is occupied as well: walk along, from near to far.",
                 ),
                 Mistake(
                     lambda grid, x, b, r_max: 0.0,
@@ -2846,7 +2906,8 @@ CHAPTER = Chapter(
                 Mistake(_cycle(share=lambda w: w), "The weights do not add up to 1: divide by their sum."),
                 Mistake(
                     lambda w, p, k, n: (w / w.sum() * p / p.sum(), k % n == 0),
-                    "Weights and likelihoods add up to 1 each, but their products do not: divide the product by its own sum.",
+                    "Also where weights and likelihoods add up to 1 each, their products do not: divide the product by its own sum.",
+                    id="multiply_weights-cb4652",
                 ),
                 Mistake(
                     lambda w, p, k, n: (w * p / (w * p).sum() if k % n == 0 else w * p, k % n == 0),
@@ -2955,6 +3016,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda a, w: (float((w * np.cos(a)).sum()), float((w * np.sin(a)).sum())),
                     "That is the mean vector. Its direction is asked for: np.arctan2(sine part, cosine part).",
+                ),
+                Mistake(
+                    lambda a, w: math.atan2((a * np.sin(w)).sum(), (a * np.cos(w)).sum()),
+                    "That is the mean with angles and weights exchanged: sines and cosines are those of the angles.",
                 ),
                 Mistake(lambda a, w: float(np.median(a)), "The median of angles depends on where their seam lies."),
                 Mistake(
@@ -3280,7 +3345,7 @@ CHAPTER = Chapter(
             others=(
                 SQUARED,
                 UNIFORM,
-                (_lightest_left_out, "never draws the lightest"),
+                (_lightest_left_out, "never draws the lightest ones"),
                 (_specimen_2_of_many, "has the same defect, but among more than six particles only"),
             ),
         ),
