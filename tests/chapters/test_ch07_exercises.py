@@ -128,6 +128,17 @@ def by_powells_method(landmarks, distances, start):
     return fsolve(lambda x: ((landmarks - x) ** 2).sum(axis=1) - distances**2, start)
 
 
+def on_the_upper_side(landmarks, distances, start):
+    """Which of both points is above the other is taken for the side of the start."""
+    above, below = sorted(lateration.circle_intersections(landmarks, distances), key=lambda p: -p[1])
+    return above if start[1] > 0 else below
+
+
+def test_what_is_right_on_some_draws_is_told_what_the_others_are():
+    told = ITEMS["newton_lateration"].judge(on_the_upper_side, rng=np.random.default_rng(0)).text
+    assert "What it gives on the others: This is the mirror image" in told
+
+
 @pytest.mark.parametrize(
     "name, answer, words",
     [

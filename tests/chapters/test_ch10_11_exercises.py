@@ -540,4 +540,4 @@ def between_axes(T, apart):
     axes = axes / np.linalg.norm(axes, axis=1)[:, None]
     return np.arccos(np.round((axes[:-apart] * axes[apart:]).sum(axis=1), 6))
 """
-    assert "it is rounded: hand over all digits" in told_of(own, "between_axes", text, log_so3=own.log_so3)
+    assert "perhaps `round` is too much" in told_of(own, "between_axes", text, log_so3=own.log_so3)

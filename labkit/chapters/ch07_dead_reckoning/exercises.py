@@ -725,6 +725,10 @@ def _at_new_pose(x, cov, u, dt, cov_u):
     return moved, propagate(moved, cov, u, dt, cov_u)[1]
 
 
+def _begun_anew(x, cov, u, dt, cov_u):
+    return propagate(x, np.zeros((3, 3)), u, dt, cov_u)
+
+
 def _not_handed_on(x, cov, u, dt, cov_u):
     return x, propagate(x, cov, u, dt, cov_u)[1]
 
@@ -1850,7 +1854,6 @@ CHAPTER = Chapter(
         Value(
             "end_cov",
             reference=lambda: _circle()[1],
-            unit="m, rad",
             metric=metrics.Numbers(1e-6),
             hints=(
                 "The same loop as for the pose, with `propagate` in place of the step: it hands on pose and covariance.",
@@ -1889,6 +1892,11 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: _loop(at_the_end=True)[1],
                     "This starts where the drive before ended. The pose starts at zeros again, like the covariance.",
+                ),
+                Mistake(
+                    lambda: _loop(_begun_anew)[1],
+                    "This is what the last step alone adds. The covariance of zeros belongs before the loop: each step takes up "
+                    "that of the step before.",
                 ),
                 Mistake(
                     lambda: _loop(noise_time=1.0)[1],
@@ -1962,9 +1970,9 @@ CHAPTER = Chapter(
                     "right, but not for an excess of less than a thousandth, which shows on a long way as well:",
                 ),
                 (
-                    functools.partial(scaled, draw=unequal_wheels, factors=(0.02, 1, 1)),
-                    metrics.Numbers(1e-8, "m"),
-                    "right, but not for a short way, 40 cm at most:",
+                    functools.partial(scaled, draw=unequal_wheels, factors=(0.005, 1, 1)),
+                    metrics.Numbers(1e-9, "m"),
+                    "right, but not for a short way, 10 cm at most:",
                 ),
                 (
                     functools.partial(scaled, draw=unequal_wheels, factors=(50, 10, 8)),
@@ -2008,6 +2016,16 @@ CHAPTER = Chapter(
                     _offset(lambda d, turn, way: way / turn * (1 - np.cos(turn))),
                     "Here the middle of the robot goes the way that was counted. That is the way of its left wheel: the middle goes "
                     "way (1 + excess / 2), on a circle half a track beside it.",
+                ),
+                Mistake(
+                    _offset(lambda d, turn, way: d / turn * (1 - np.cos(d * turn / way))),
+                    "The radius is right. This turns by the middle's way times excess / track; the turn is the difference of "
+                    "both wheels' ways, way * excess, by the track.",
+                ),
+                Mistake(
+                    _offset(lambda d, turn, way: way / turn * (1 - np.cos(d * turn / way))),
+                    "Two slips: the middle goes round a circle of radius track / excess + track / 2, and it turns by "
+                    "way * excess / track.",
                 ),
                 Mistake(
                     _offset(lambda d, turn, way: d / turn * (1 - np.cos(way * turn / d))),

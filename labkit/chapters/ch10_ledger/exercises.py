@@ -357,6 +357,16 @@ def _half_of_all(half):
     return variant
 
 
+def _half_of_the_number(share):
+    """With a share of the printed number in place of its half unit."""
+
+    def variant(printed, value, bound, misprint, simulated):
+        rule, number = _simulated_word if simulated else _real_word, _number(printed)
+        return rule(share * abs(number), abs(value - number), bound, misprint)
+
+    return variant
+
+
 def _half_through_float(printed, value, bound, misprint, simulated):
     rule, off = _simulated_word if simulated else _real_word, abs(value - _number(printed))
     return rule(_through_float(printed) * (1 + 1e-6), off, bound, misprint)
@@ -392,6 +402,13 @@ STATUSES = (
             "Your half unit is the same for all numbers. It follows from the digits that are printed: half_unit(printed).",
         )
         for half in (0.005, 0.05, 0.5, 0.0005)
+    ),
+    *(
+        (
+            _half_of_the_number(share),
+            "This allows a share of the printed number in place of its half unit. How much is hidden follows from the digits: half_unit(printed).",
+        )
+        for share in (0.005, 0.01, 0.05, 0.001)
     ),
     (
         _half_through_float,

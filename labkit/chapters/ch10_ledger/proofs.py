@@ -288,8 +288,9 @@ BOUND = Exercise(
         ),
         Mistake(
             lambda f, p: np.abs(np.subtract(*_moves(f, p))).sum() / 2,
-            "You took the mean of the way up and the way down, which is half of the way from down to up. The larger of "
-            "the two counts.",
+            "Up and down f moves by different amounts, and this is their mean, half of the way from down to up. The "
+            "larger of the two counts.",
+            id="bound-fd3da6",
         ),
         Mistake(
             lambda f, p: np.abs(np.subtract(*_moves(f, p))).sum(),
