@@ -19,8 +19,8 @@ CONFUSED = 3  # pairs of words that are told, at most
 
 def case_words(draws, missed):
     """What the draws on which an answer is wrong have in common, behind "it was wrong": "exactly where" no other has
-    it, "only where" some have; None when nothing is found, or when so few draws are looked at, or missed, that it may
-    be chance.
+    it, be it one of two things or both, "only where" some have; None when nothing is found, or when so few draws are
+    looked at, or missed, that it may be chance.
 
     Parameters
     ----------
@@ -32,17 +32,31 @@ def case_words(draws, missed):
     ways = math.comb(len(missed), sum(missed))
     if ways < WAYS:
         return None
-    told = {words: true for words, true in _told(draws).items() if not all(true)}
-    told = {words: true for words, true in told.items() if all(t or not m for t, m in zip(true, missed))}
+    found = {words: true for words, true in _told(draws).items() if any(true) and not all(true)}
+    told = {words: true for words, true in found.items() if all(t or not m for t, m in zip(true, missed))}
+    parts = {words: true for words, true in found.items() if all(m or not t for t, m in zip(true, missed))}
     exact = (words for words, true in told.items() if true == missed)
     if words := next(exact, None):
         return f"exactly where {words}"
     for one, two in itertools.combinations(told, 2) if ways > PAIRS * WAYS else ():
         if [a and b for a, b in zip(told[one], told[two])] == missed:
             return f"exactly where {one} and {two}"
+    if ways > PAIRS * WAYS and (words := _either(parts, missed)):
+        return f"exactly where {words}"
     rarest = min(told, key=lambda words: sum(told[words]), default=None)
     if rarest and (sum(told[rarest]) / len(missed)) ** sum(missed) < 1 / WAYS:
         return f"only where {rarest}"
+    return None
+
+
+def _either(parts, missed):
+    """Two traits of which the draws have one or both on which an answer is wrong, in words; None where there are none.
+
+    parts: {words: on which draws they are true} of traits that no other draw has.
+    """
+    for one, two in itertools.combinations(parts, 2):
+        if [a or b for a, b in zip(parts[one], parts[two])] == missed:
+            return f"{one} or {two}"
     return None
 
 
@@ -85,7 +99,9 @@ def result_words(results):
         if not any(result for result, _ in wrong):
             return "it returns an empty set where something belongs into it"
         if all(result < expected for result, expected in wrong):
-            return "what it returns is right, but not all of it is there"
+            more = sum(len(expected) > 1 for _, expected in results) > 2
+            one = ", and never more than one entry" if more and all(len(result) < 2 for result, _ in results) else ""
+            return f"what it returns is right, but not all of it is there{one}"
         if all(result > expected for result, expected in wrong):
             return "all that is right is there, but more is returned than that"
         return None
@@ -137,7 +153,7 @@ def _of_value(here, value):
             f"{here} holds a comma": any("," in v for v in value),
             f"{here} has one entry": len(value) == 1,
             f"{here} holds the same text twice": len(set(value)) < len(value),
-        }
+        } | {f"{here} does not have {n} entries": len(value) != n for n in range(2, 7)}
     several = _of_arrays(here, value) if isinstance(value, list | tuple) else {}
     try:
         array = np.asarray(value, dtype=float)

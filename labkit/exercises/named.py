@@ -100,6 +100,18 @@ class Named(Evidence):
         words = "\n".join(f"{name}: {text}" for name, text in texts.items())
         return self.outcome(NOT_YET, words, first) if len(texts) > 1 else None
 
+    def _named_elsewhere(self):
+        """The text of the mistake that an answer is wherever it is wrong, where it is right on other draws; None where
+        it is none on all of them, or where one of several is to be chosen, so that two rules may decide alike.
+        """
+        if self.refusal or isinstance(self.exercise.metric, metrics.Exactly):
+            return None
+        draws = [(args, m, pair) for args, m, pair in self._cases() + self._fresh_results if not m.equal(*pair)]
+        for mistake in self.exercise.mistakes if len(draws) > 1 else ():
+            if all(self._is_mistake(mistake, *draw) for draw in draws):
+                return mistake.text
+        return None
+
     def _is_slip_of(self, k, part, metric, cases):
         """Whether one part of the results is that of mistake k on all draws."""
         try:

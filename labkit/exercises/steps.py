@@ -413,8 +413,7 @@ class Search:
         """These places in their order, but what is taken apart at once, as `x` in `x[2]`, behind all others."""
         places = self.written.places
 
-        whole = (text.split(" = ", 1)[-1].startswith(f"{places[first][1]}[") for _, text, _, _, first in places)
-        apart = {place[-1] for place, taken in zip(places, whole) if taken}
+        apart = {first for _, text, _, _, first in places if text.startswith(f"{places[first][1]}[")}
         return sorted(among, key=lambda k: (k in apart, k))
 
     def _is_asked_for(self, function):
@@ -661,10 +660,10 @@ class Search:
         given = ([rerun.numeric(case.args[i]) for case in self.cases] for i in range(len(self.names)))
         return any(all(g is not None for g in arg) and self._is_value(k, [g[None] for g in arg]) for arg in given)
 
-    def _is_value(self, k, theirs):
+    def _is_value(self, k, theirs, same=None):
         """Whether a value on the way is another one on every draw, round by round; or one of rounds, row by row."""
-        mine = [values[k] for values in self.values]
-        return all(count and (_same(m, t) or len(t) == 1 and _same(m, t[0])) for (count, m), t in zip(mine, theirs))
+        mine, same = [values[k] for values in self.values], same or _same
+        return all(count and (same(m, t) or len(t) == 1 and same(m, t[0])) for (count, m), t in zip(mine, theirs))
 
     def _is_returned(self, k):
         """Whether a value is what comes out on every draw on which that is of a kind to be compared."""
@@ -698,8 +697,7 @@ class Search:
                     any(values[i][0] > 1 for values in v) for i, v in ((k, self.values), (q, solution.values))
                 )
                 each = (self._in_which_round(k) if theirs else ", a part of it in each round") if mine else ""
-                others = " on some draws" if any(case.was_right for case in self.cases) else ""
-                return f"{self._where(k)}, stands the right result{each}, but something else is returned{others}"
+                return f"{self._where(k)}, stands the right result{each}, but something else is returned"
         return None
 
     def _in_which_round(self, k):
@@ -726,7 +724,11 @@ class Search:
             return None
         units = self._units(solution)
         right = [
-            self._is_known(k, solution, False) or self._is_row(k, solution) or self._is_part(k, solution) for k in units
+            self._is_known(k, solution, False)
+            or self._is_row(k, solution)
+            or self._is_part(k, solution)
+            or self._is_part(k, solution, _same_but_for_turns)
+            for k in units
         ]
         again = [self._is_bound_again(k) for k in units]
         if True in again:  # what the name stands for in the end is not what is bound there
@@ -784,19 +786,19 @@ class Search:
                 return True
         return False
 
-    def _is_part(self, k, solution):
+    def _is_part(self, k, solution, same=None):
         """Whether a value is one entry or one column of the right results, or of a value that the solution has."""
         expected = [rerun.numeric(case.expected) for case in self.cases]
-        if not any(e is None for e in expected) and self._is_column(k, [e[None] for e in expected]):
+        if not any(e is None for e in expected) and self._is_column(k, [e[None] for e in expected], same):
             return True
-        return any(self._is_column(k, [values[q][1] for values in solution.values]) for q in solution.distinct)
+        return any(self._is_column(k, [values[q][1] for values in solution.values], same) for q in solution.distinct)
 
-    def _is_column(self, k, wholes):
+    def _is_column(self, k, wholes, same):
         """Whether a value is, round by round, one entry along the last axis of others."""
         if any(w.ndim < 2 or w.shape[-1] != wholes[0].shape[-1] for w in wholes):
             return False
         entries = range(min(wholes[0].shape[-1], ENTRIES))
-        return any(self._is_value(k, [w[..., j] for w in wholes]) for j in entries)
+        return any(self._is_value(k, [w[..., j] for w in wholes], same) for j in entries)
 
     def _is_taken_out(self, k, solution):
         """Whether this is but a part, the length or the transpose of a value that is right."""
@@ -1015,6 +1017,11 @@ def _all_same(draws, q, other):
 
 def _same(a, b):
     return np.shape(a) == np.shape(b) and bool(np.allclose(a, b, rtol=CLOSE, atol=1e-12, equal_nan=True))
+
+
+def _same_but_for_turns(a, b):
+    """Whether angles are the same, or whole turns apart, as one that is wrapped and one that is not."""
+    return np.shape(a) == np.shape(b) and _same(np.round(np.subtract(a, b) / (2 * np.pi)) * (2 * np.pi) + b, a)
 
 
 def _in_rounds(mine, theirs):

@@ -94,8 +94,7 @@ class Trial(Raised, Staying):
         solution = search and not step and self._solution(search)
         step = step or search and (search.passed_words(solution) or search.notebook_words(solution) or search.words())
         shape = self._other_shape() if self.refusal else ""
-        step = step or (None if words or shape else unmoved or self._one_change())
-        words = words or (not self.refusal and step)
+        words = words or (not self.refusal and step) or (not shape and not step and (unmoved or self._one_change()))
         if words:
             return self.outcome(NOT_YET, closed(words) + self._about_globals())
         if search and not step and not self._right_often():

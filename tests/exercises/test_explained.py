@@ -112,6 +112,7 @@ TEXTS = [
             "exactly where `printed` has an exponent that is not negative and",
         ),
         (lambda g, e: e == 1, "exactly where `1` is right"),
+        (lambda g, e: "," in g["printed"] or e == 1, "exactly where `printed` has a comma or `1` is right"),
         (lambda g, e: g["printed"] == "1.20" and e != 1, "only where the decimals of `printed` end with a zero"),
     ],
 )
@@ -125,6 +126,7 @@ def test_what_texts_and_words_have_in_common_one_or_two_at_once(is_wrong, told):
         ([{"printed": t} for t in ("3e-12", "3e-2", "3.1", "0.31")], "`printed` has an exponent of several digits"),
         ([{"printed": t} for t in ("0.31", "-5,2", "3.1", "30")], "the digits of `printed` begin with a zero"),
         ([{"texts": t} for t in (["3", "4", "3"], ["3", "4"], ["4", "5", "7"])], "`texts` holds the same text twice"),
+        ([{"texts": n * ["3"]} for n in (4, 5, 5)], "`texts` does not have 5 entries"),
         ([{"texts": ["3", t], "mean": "3.5"} for t in ("3.5", "4", "5")], "`texts` holds what `mean` is"),
         ([{"J": np.ones((7, n))} for n in (4, 3, 3)], "`J` has more than 3 columns"),
         ([{"Js": [np.ones((3, 2)), np.ones((3, n))]} for n in (9, 6, 2)], "a matrix in `Js` has more than 6 columns"),
@@ -153,6 +155,7 @@ def test_what_only_a_few_others_have_is_told_too():
         ([("a", "b"), ("c", "c"), ("a", "b")], "it returns 'a' where 'b' is right"),
         ([("a", "b"), ("b", "c"), ("c", "c")], "it returns 'a' where 'b' is right and 'b' where 'c' is right"),
         ([({1}, {1, 2}), (set(), {3})], "what it returns is right, but not all of it is there"),
+        (3 * [({1}, {1, 2})], "what it returns is right, but not all of it is there, and never more than one entry"),
         ([({1, 2}, {1}), ({3}, {3})], "all that is right is there, but more is returned than that"),
         ([(set(), {1}), (set(), set())], "it returns an empty set where something belongs into it"),
         ([({1}, {2}), ({3}, {3})], None),

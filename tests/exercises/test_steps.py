@@ -450,6 +450,22 @@ def test_what_has_no_counterpart_or_lacks_a_factor_is_not_said_to_be_first(bound
     assert search.agreement_words(solution) == "As far as `u` (line 2) your values are those of the solution"
 
 
+def test_an_angle_that_is_wrapped_is_that_of_the_solution():
+    rng = np.random.default_rng(0)
+    draws = [(rng.normal(size=3), rng.uniform(1, 2, 3)) for _ in range(4)]
+    cases = [steps.Case(args, metrics.PlanarPoses(), _pose(*args), np.zeros(3)) for args in draws]
+    wrapped = typed("t = np.angle(np.exp(4j * b[2]))\np = np.sinh(a[0]) * t\nreturn np.rint([p, a[1], t])")
+    search = steps.search(wrapped, ["a", "b"], cases, None, Budget(1.0))
+    solution = steps.Solution(
+        rerun.written(typed("return np.array([a[0] * b[1], a[1], 4 * b[2]])")), cases, Budget(1.0)
+    )
+    assert search.agreement_words(solution).startswith("As far as `t` (line 2) your values are those of the solution")
+
+
+def _pose(a, b):
+    return np.array([a[0] * b[1], a[1], 4 * b[2]])
+
+
 def _cases():
     rng = np.random.default_rng(0)
     draws = [(rng.normal(size=3), rng.normal(size=3)) for _ in range(4)]
