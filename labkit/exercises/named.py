@@ -74,12 +74,15 @@ class Named(Evidence):
         return True
 
     def _named_by_failing(self, error, args):
-        """The mistake that explains the draws so far and fails alike on this one: right, or possible, in one size."""
+        """The mistake that explains the draws so far, right or possible in one size, and fails on this one in the very
+        same words: these tell of the sizes that did not fit.
+        """
         if not isinstance(error, ValueError | TypeError | IndexError):
             return None
         cases = [*zip(self.inputs, self.metrics, self.pairs)]
         for k, mistake in enumerate(self.exercise.mistakes):
-            alike = cases and type(failure_of(mistake, args)) is type(error)
+            failure = failure_of(mistake, args) if cases else None
+            alike = type(failure) is type(error) and str(failure) == str(error)
             if alike and all(self._is_mistake(mistake, *case) for case in cases):
                 return self.outcome(NOT_YET, mistake.text, k)
         return None

@@ -38,6 +38,23 @@ def as_many_states_as_readings(x, cov, z, C, cov_z):
     return x + K @ (z - C @ x), (np.eye(len(z)) - K @ C) @ cov
 
 
+def two_states_by_hand(x, cov, A, B, u, cov_u):
+    p, v = x
+    return A @ np.array([p, v]) + B @ u, A @ cov @ A.T + B @ cov_u @ B.T
+
+
+def two_numbers_by_hand(x, cov, z, C, cov_z):
+    (a, b), (c, d) = C @ cov @ C.T + cov_z
+    K = cov @ C.T @ np.array([[d, -b], [-c, a]]) / (a * d - b * c)
+    return x + K @ (z - C @ x), (np.eye(len(x)) - K @ C) @ cov
+
+
+@pytest.mark.parametrize("name, answer", [("predict_state", two_states_by_hand), ("update", two_numbers_by_hand)])
+def test_who_fails_in_another_size_by_other_means_is_not_told_of_these(name, answer):
+    status, texts = judged(name, answer)
+    assert status == RAISED and all("values to unpack" in text for text in texts), texts
+
+
 @pytest.mark.parametrize(
     "name, answer, words",
     [

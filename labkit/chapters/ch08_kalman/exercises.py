@@ -593,13 +593,13 @@ def _settled(A, C, Q, R):
     return before, P
 
 
-def _rounds(n, gain=_gain, noise=1):
+def _rounds(n, gain=_gain, noise=1, carry=lambda A, P: A @ P @ A.T):
     """The gain after n rounds from the identity; with noise = 0, what the system adds is added at the start only."""
 
     def variant(A, C, Q, R):
         P = np.eye(len(A)) + (1 - noise) * Q
         for _ in range(n):
-            P = A @ P @ A.T + noise * Q
+            P = carry(A, P) + noise * Q
             K = gain(P, C, R)
             P = _shrunk(P, K, C)
         return K
@@ -1485,7 +1485,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, C, Q, R: _gain(Q, C, R),
-                    "You took the system noise for the covariance. The covariance is what builds up.",
+                    "This is the gain that belongs to cov_v alone, as in a first step from a covariance of zeros. The covariance is what builds up: repeat until the gain stands still.",
+                    id="steady_state_gain-4fcede",
                 ),
                 Mistake(
                     lambda A, C, Q, R: kalman.steady_state(A, C, Q, R).cov_before @ C.T @ np.linalg.inv(R),
@@ -1514,12 +1515,25 @@ CHAPTER = Chapter(
                     _rounds(1000, gain=_gain_by_the_diagonal),
                     "You divide by the diagonal of S alone. What is measured together goes together: S is to be inverted as a whole.",
                 ),
+                Mistake(
+                    _rounds(1000, carry=lambda A, P: A.T @ P @ A),
+                    "A stands on the wrong side: A cov A^T, not A^T cov A.",
+                ),
+                Mistake(
+                    _rounds(1000, carry=lambda A, P: P),
+                    "The old covariance must be carried along by A, in every round: A cov A^T.",
+                ),
+                Mistake(
+                    _rounds(1000, gain=lambda P, C, R: _gain(P, C, 0 * R)),
+                    "The sensor's noise is missing from S: this gain believes every measurement.",
+                ),
                 *(
                     Mistake(
                         _rounds(n, noise=0),
-                        "Your gain dies out: cov_v comes in at the start only. The system adds its noise anew with every step, within the loop.",
+                        "Your gain dies out: cov_v is missing within the loop. The system adds its noise anew with every step.",
+                        id=id,
                     )
-                    for n in (1000, 3000)
+                    for n, id in ((1000, "steady_state_gain-08a959"), (3000, "steady_state_gain-08a959-2"))
                 ),
                 Mistake(
                     lambda A, C, Q, R: kalman.steady_state(A, C, Q, R @ R).gain,
@@ -1704,7 +1718,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a: (a + 180) % 360 - 180,
-                    "Your angles come back as they were. The remainder `%` is taken of (angle + pi), in brackets, and of 2 pi: radians, not degrees.",
+                    "Your angles come back as they were: no turn is taken off. The remainder `%` is taken of (angle + pi), in brackets, and of 2 pi: radians, not degrees.",
+                    id="wrap_angle-9eb29d",
                 ),
                 Mistake(
                     lambda a: a % (2 * np.pi) - np.pi,
@@ -1783,7 +1798,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda x, l: np.array([measurement(x, l)[0], wrapped(np.arctan2(*(l - x[:2])) - x[2])]),
-                    "np.arctan2 takes y first, then x.",
+                    "Your direction is counted from the y axis: np.arctan2 takes y first, then x.",
+                    id="measurement-f28213",
                 ),
                 Mistake(
                     lambda x, l: measurement(x, l) * [1, 0] + [0, _turned_once(np.arctan2(*(l - x[:2])[::-1]) - x[2])],
@@ -1803,12 +1819,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda x, l: np.array([measurement(x, l)[0], np.arctan(np.divide(*(l - x[:2])[::-1])) - x[2]]),
-                    "np.arctan cannot tell left from right of the y axis: np.arctan2(dy, dx) can. And the bearing has to be wrapped.",
+                    "The arctangent of dy / dx cannot tell left from right of the y axis: np.arctan2(dy, dx) can. And the bearing has to be wrapped.",
+                    id="measurement-62b89b",
                 ),
                 *(
                     Mistake(
                         _bearing_by_arccos(wrap),
-                        "An arccosine knows no sign: it sees a landmark on the left and one on the right in the same direction. "
+                        "You see a landmark at dy and one at -dy in the same direction: an arccosine or an absolute value knows no sign. "
                         "np.arctan2(dy, dx) tells them apart.",
                         id=f"measurement-arccos-{name}",
                     )
@@ -1823,7 +1840,8 @@ CHAPTER = Chapter(
                     lambda x, l: np.array(
                         [measurement(x, l)[0], wrapped(np.arctan(np.divide(*(l - x[:2])[::-1])) - x[2])]
                     ),
-                    "np.arctan cannot tell a landmark on the left from one on the right of the y axis: np.arctan2(dy, dx) can.",
+                    "The arctangent of dy / dx cannot tell a landmark on the left from one on the right of the y axis: np.arctan2(dy, dx) can.",
+                    id="measurement-baf232",
                 ),
                 Mistake(
                     lambda x, l: measurement(x, l) * [1, -1],
@@ -1839,7 +1857,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda x, l: np.array([measurement(x, l)[0], np.arctan2(*(l - x[:2])) - x[2]]),
-                    "np.arctan2 takes y first, then x. And the bearing has to be wrapped.",
+                    "Your direction is counted from the y axis: np.arctan2 takes y first, then x. And the bearing has to be wrapped.",
+                    id="measurement-dc8471",
                 ),
                 Mistake(
                     lambda x, l: np.array(
@@ -1849,11 +1868,20 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda x, l: measurement(x, l) + [0, np.pi],
-                    "The second shift of the wrap is missing: subtract pi again.",
+                    "Your bearing is the right one plus pi: does it point backward, or is the second shift of the wrap missing? Subtract pi.",
+                    id="measurement-277f22",
                 ),
                 Mistake(
                     lambda x, l: np.array([measurement(x, l)[0], abs(measurement(x, l)[1])]),
                     "Your bearings are never negative, but a landmark on the right has a negative one: an absolute value or an arccosine cannot tell left from right.",
+                ),
+                Mistake(
+                    lambda x, l: np.array([measurement(x, l)[0], np.arcsin(np.sin(measurement(x, l)[1]))]),
+                    "Your bearings stay within a quarter turn: an arcsine cannot tell ahead from behind. np.arctan2(left, ahead) can, or np.arctan2(dy, dx) minus heading.",
+                ),
+                Mistake(
+                    lambda x, l: np.array([measurement(x, l)[0], np.arctan(np.tan(measurement(x, l)[1]))]),
+                    "Your bearings stay within a quarter turn: the arctangent of a quotient takes what is behind for what is ahead. np.arctan2(left, ahead) does not, nor np.arctan2(dy, dx) minus heading.",
                 ),
                 Mistake(
                     lambda x, l: np.array([np.abs(l - x[:2]).sum(), measurement(x, l)[1]]),
@@ -2592,7 +2620,8 @@ CHAPTER = Chapter(
                 Mistake(_batch(used=lambda z: z[:1]), "Only the first measurement counts in yours."),
                 Mistake(
                     _batch(used=lambda z: z.mean(0, keepdims=True)),
-                    "The mean is no single measurement: its covariance is cov_z divided by their number.",
+                    "This is what one measurement, the mean of them all, would give. A mean of k is surer: its covariance is cov_z / k.",
+                    id="batch_estimate-1b66a7",
                 ),
                 Mistake(
                     lambda x0, cov0, z, C, cov_z: (
