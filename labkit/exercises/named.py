@@ -75,14 +75,15 @@ class Named(Evidence):
 
     def _named_by_failing(self, error, args):
         """The mistake that explains the draws so far, right or possible in one size, and fails on this one in the very
-        same words: these tell of the sizes that did not fit.
+        same words, as these tell of the sizes that did not fit; a text is refused in words of one's own.
         """
         if not isinstance(error, ValueError | TypeError | IndexError):
             return None
         cases = [*zip(self.inputs, self.metrics, self.pairs)]
         for k, mistake in enumerate(self.exercise.mistakes):
             failure = failure_of(mistake, args) if cases else None
-            alike = type(failure) is type(error) and str(failure) == str(error)
+            sized = any(isinstance(arg, np.ndarray) for arg in args)
+            alike = type(failure) is type(error) and (str(failure) == str(error) or not sized)
             if alike and all(self._is_mistake(mistake, *case) for case in cases):
                 return self.outcome(NOT_YET, mistake.text, k)
         return None

@@ -504,8 +504,6 @@ class Search:
         words = relations.difference_words(self.cases[0].metric, self._pairs(found), (), True)
         if words and not self._are_given(found):
             return words
-        if all(case.keep((result,)) for case, result in zip(self.cases, found)):  # it is none that mends others as well
-            return "your result comes out right on the draws tried so far, though perhaps not on all"
         parts = [case.right_parts(result) for case, result in zip(self.cases, found)]
         if any(not set(before) <= set(after) for before, after in zip(right, parts)):
             return None
@@ -516,6 +514,8 @@ class Search:
         come = [part for part in parts[0] if part in come]
         if not come or len(come) > 4:
             return None
+        if all(case.keep((result,)) for case, result in zip(self.cases, found)):  # it is none that mends others as well
+            return "your result comes out right on the draws tried so far, though perhaps not on all"
         return f"{' and '.join(come)} {'come' if len(come) > 1 else 'comes'} out right, though not all"
 
     def _are_given(self, results):
