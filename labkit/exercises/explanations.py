@@ -201,7 +201,8 @@ class Explanations(Named):
             return ""
         names = getattr(self.exercise.metric, "names", ())
         words = shapes.shape_words(results, [expected for _, expected in pairs], names)
-        return f" {words[0].upper()}{words[1:]}." if words else ""
+        named = words and words.partition(":")[0] in names
+        return f" {words if named else words[0].upper() + words[1:]}." if words else ""
 
     def _unmoved(self):
         """An argument that makes no difference to the results, though it should."""

@@ -394,12 +394,16 @@ def _plain(words):
 
 @dataclass(frozen=True)
 class Several(Metric):
-    """A tuple of results, each with its own metric and name."""
+    """A tuple of results, each with its own metric and name; `together` where none has a slip of its own, as each
+    follows from all of them.
+    """
 
     metrics: tuple
     names: tuple
+    together: bool = False
 
-    def __init__(self, *metrics, names):
+    def __init__(self, *metrics, names, together=False):
+        object.__setattr__(self, "together", together)
         object.__setattr__(self, "metrics", metrics)
         object.__setattr__(self, "names", tuple(names))
         if len(metrics) != len(self.names):

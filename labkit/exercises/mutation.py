@@ -44,6 +44,7 @@ TWINS = {name: (twin,) for pair in PAIRS for name, twin in (pair, pair[::-1])} |
 WRAPPERS = {"array", "asarray", "float", "int", "list", "tuple", "range", "len", "zip", "enumerate", "bool", "set"}
 MODULES = {"np", "numpy", "math", "scipy"}  # what they hold is no data of the notebook
 CAST = "astype"  # the argument of which is no value
+NO_SEARCH = {"map", "filter", "sorted", "max", "min", "sum", "vectorize", "fromfunction", "apply_along_axis", "reduce"}
 GUARD = 1e-3  # below which a bound stands for 0
 BOUNDED = {"clip"}  # exchanged, a value and its bound make a constant: that mends, and is not what happened
 BOUNDS = {"max", "min", "maximum", "minimum"}
@@ -293,6 +294,8 @@ def _everywhere(found):
     """One change made at all places at once that look alike but for their names, or lose the same function."""
     alike = {}
     for change in found:
+        if _is_cancelled(change):
+            continue
         likely = change.rank <= REPEATED or isinstance(change.place, ast.Attribute)  # `wells.value` for `f`, each time
         if likely and change.mends and isinstance(change.place, ast.expr):
             alike.setdefault((change.words, _form(change.place), _form(_put(change))), []).append(change)
@@ -305,6 +308,13 @@ def _everywhere(found):
         first, *others = sorted(group, key=lambda change: (change.place.lineno, change.place.col_offset))
         also = " and ".join(f"`{ast.unparse(other.place)}` (line {other.place.lineno})" for other in others)
         yield Change(first.words, f"{first.mends}, and the same in {also}", first.rank, first.place, sets)
+
+
+def _is_cancelled(change):
+    """Whether a number is added in the place of a factor, or taken off: made in several places it may well cancel."""
+    here, new = change.place, _put(change) if isinstance(change.place, ast.BinOp) else None
+    sums = isinstance(getattr(new, "op", None), ast.Add | ast.Sub) and not isinstance(here.op, ast.Add | ast.Sub)
+    return sums and any(isinstance(side, ast.Constant) for side in (here.left, here.right))
 
 
 def _put(change):
@@ -377,8 +387,32 @@ def mending(function):
     found += _lost_signs(function)
     found += _of_diagonals(function)
     found += _sizes(function)
-    meant = {*_digits_left(function), *_not_repeated(function)}
+    meant = {*_digits_left(function), *_not_repeated(function), *_typed_starts(function)}
     return sorted((change for change in found if change.place not in meant), key=lambda change: change.rank)
+
+
+def starts(function):
+    """What is handed to a search beside a function, where it begins: the right result stays where it is there, and from
+    another place it may well be found.
+    """
+    functions = {node.name for node in ast.walk(function) if isinstance(node, ast.FunctionDef)}
+    steps = [n for n in ast.walk(function) if isinstance(n, ast.Assign) and isinstance(n.targets[0], ast.Name)]
+    functions |= {step.targets[0].id for step in steps if isinstance(step.value, ast.Lambda)}
+    for call in (node for node in ast.walk(function) if isinstance(node, ast.Call) and _called(node) not in NO_SEARCH):
+        handed = [*call.args, *(keyword.value for keyword in call.keywords)]
+        beside = [
+            part for part in handed if not isinstance(part, ast.Lambda) and getattr(part, "id", "") not in functions
+        ]
+        if len(beside) < len(handed):
+            yield from beside
+            yield from (step.value for step in steps if step.targets[0].id in {getattr(p, "id", "") for p in beside})
+
+
+def _typed_starts(function):
+    """Parts of where a search begins, if that is made of numbers alone."""
+    for start in starts(function):
+        if {n.id for n in ast.walk(start) if isinstance(n, ast.Name)} <= MODULES:
+            yield from ast.walk(start)
 
 
 def _digits_left(function):

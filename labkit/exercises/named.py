@@ -90,7 +90,7 @@ class Named(Evidence):
 
     def _named_in_parts(self):
         """Of several results each may be a slip of its own: then each gets its text."""
-        if not isinstance(self.exercise.metric, metrics.Several) or self.refusal:
+        if not isinstance(self.exercise.metric, metrics.Several) or self.exercise.metric.together or self.refusal:
             return None
         cases = [case[:3] for case in zip(self.inputs, self.metrics, self.pairs, self.words) if case[3] is None]
         texts, first = {}, None

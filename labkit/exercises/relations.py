@@ -504,6 +504,6 @@ def not_accurate_enough(deviation):
     if deviation.words or deviation.amount > min(CLOSE * deviation.tolerance, FAR):
         return None
     return (
-        f"{deviation}: right in kind, but not accurate enough. Too few iterations, a step of differences too large, or "
-        "a rounded number on the way?"
+        f"{deviation}: right in kind, but not accurate enough. Too few iterations, too long or too short a step of "
+        "differences, or a rounded number on the way?"
     )

@@ -133,24 +133,7 @@ def _bare(node):
 
 
 def _searched(tree):
-    """Lines of calls that are handed a function, as a search for a minimum is, and of what else they are handed: where
-    a search begins, the right result stays where it is.
-    """
-    functions = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
-    functions |= {
-        node.targets[0].id
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Lambda) and isinstance(node.targets[0], ast.Name)
-    }
-    read = set()
-    for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
-        handed = [*call.args, *(keyword.value for keyword in call.keywords)]
-        if any(isinstance(part, ast.Lambda) or getattr(part, "id", None) in functions for part in handed):
-            read |= {n.id for part in handed for n in ast.walk(part) if isinstance(n, ast.Name)}
-            yield from range(call.lineno, call.end_lineno + 1)
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node.id in read:
-            yield node.lineno
+    return (line for start in mutation.starts(tree) for line in range(start.lineno, start.end_lineno + 1))
 
 
 def _iterated(tree):
@@ -195,8 +178,13 @@ class Written:
 
     @functools.cached_property
     def iterated(self):
-        """Lines in which a variable is bound that a loop makes anew of itself, or that a search begins with."""
-        return {line for tree in self.trees for lines in (_iterated, _searched) for line in lines(tree)}
+        """Lines in which a variable is bound that a loop makes anew of itself."""
+        return {line for tree in self.trees for line in _iterated(tree)}
+
+    @functools.cached_property
+    def searched(self):
+        """Lines in which stands where a search begins."""
+        return {line for tree in self.trees for line in _searched(tree)}
 
     @functools.cached_property
     def walked(self):
@@ -550,6 +538,8 @@ def _of_its_shape(change):
 SIGNLESS = "it belongs there without its sign"
 OPPOSITE = "1 less it, 1 - ..., belongs there"
 NOUGHT, ONE = "it does not belong there, but 0 in its place", "it does not belong there, but 1 in its place"
+IDENTITY = "the identity belongs in its place"
+WEIGHTS = ONE, IDENTITY  # what is as good as no factor
 ANOTHER = "{} belongs in its place"
 OF_ARRAYS = {  # what the same changes are called where they are made to an array: a number may not take its place
     NOUGHT: "it does not belong there, but zeros of its shape in its place",
@@ -579,7 +569,7 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
     (OPPOSITE, _truth),
     (NOUGHT, np.zeros_like),
     (ONE, np.ones_like),
-    ("the identity belongs in its place", lambda v: 0 * _square(v) + np.eye(v.shape[-1])),
+    (IDENTITY, lambda v: 0 * _square(v) + np.eye(v.shape[-1])),
     ("it is to be divided by its length", _normalized),
     ("each of its rows is to be divided by its own length", _rows_normalized),
     ("the mean of its rows is to be taken off", _with_own_rows),

@@ -162,6 +162,7 @@ def _more(rows):
         yield "the expected result is the last entry or row of what you return", lambda r: r[-1]
     for k in range(min(rows, MOST)):
         yield f"the expected result is entry or row {k} (counted from 0) of what you return", lambda r, k=k: r[k]
+    yield "the expected result is the last entry or row of what you return", lambda r: r[-1]
     for k in range(MOST):
         yield f"the expected result is column {k} (counted from 0) of what you return", lambda r, k=k: _table(r)[:, k]
     for words, digest in _digests("the numbers you return"):  # of two numbers the first may be the larger by chance

@@ -396,6 +396,7 @@ class Search:
         numeric = [i for i in range(len(self.names)) if all(is_numeric(case.args[i]) for case in self.cases)]
         first = self.values[0]
         reached = (k for k in self._entries_first(among) if first[k][0] and not self._is_filled(k))
+        reached = (k for k in reached if not self._is_start(k))
         seen = [(k, first[k][1][0], self._is_bounded(k)) for k in reached]
         for change, (words, function) in enumerate(rerun.OTHERWISE):
             if not self._may_be_said(words) or change < rerun.ALONE and self._is_asked_for(function):
@@ -405,6 +406,8 @@ class Search:
                 for k, value, bounded in seen:
                     counted = SCALED.match(words) and COUNT.search(self.written.places[k][1])
                     if counted or bounded and words != rerun.SIGNLESS:
+                        continue
+                    if words in rerun.WEIGHTS and value.ndim and self._is_weighed(k):
                         continue
                     if _changes(function, value, others) and not self._is_all_of_it(k, function, value, others):
                         yield "value", k, change, argument
@@ -592,7 +595,19 @@ class Search:
         """Whether the right result in a value's place says nothing: in the result's, and where an iteration goes on or
         a search begins.
         """
-        return self.is_result(k) or self.written.places[k][0] in self.written.iterated
+        return self.is_result(k) or self.written.places[k][0] in self.written.iterated | self.written.searched
+
+    def _is_start(self, k):
+        """Whether a value is one number throughout where a search begins, from another one of which it may arrive."""
+        if self.written.places[k][0] not in self.written.searched:
+            return False
+        drawn = [values[k][1].ravel() for values in self.values if values[k][0]]
+        return not np.ptp(np.concatenate(drawn))
+
+    def _is_weighed(self, k):
+        """Whether a value is taken as a whole by a call: ones, or I, in its place would be no weights."""
+        outer = next((text for _, text, _, _, first in self.written.places[k + 1 :] if first <= k), "")
+        return bool(re.fullmatch(r"(\w+ = )?[\w.]+\(" + re.escape(self.written.places[k][1]) + r"\)", outer))
 
     def _is_rearranged(self, k):
         """Whether a value holds the numbers of the result in another shape: that they are wrong says nothing."""

@@ -225,6 +225,16 @@ def test_a_place_where_the_gradient_vanishes_is_told_to_be_no_saddle_by_its_kind
     assert words in judged("saddle", place).text
 
 
+def test_of_a_run_no_part_has_a_slip_of_its_own():
+    """Where it ends follows from the radius, and the other way round."""
+    half, fixed = (
+        beyond.loop(follow=lambda radius, length, rho: length / 2 if rho < 0.25 else beyond.rule(radius, length, rho)),
+        beyond.loop(follow=lambda radius, length, rho: radius),
+    )
+    assert judged("trust_region", half).mistake is not None and judged("trust_region", fixed).mistake is not None
+    assert judged("trust_region", lambda *given: (half(*given)[0], fixed(*given)[1])).mistake is None
+
+
 def test_of_few_small_numbers_a_simple_ratio_is_told_and_no_slip():
     assert judged("tipping_weight", 2.4).text == "your value is 4/3 times the expected one."
 

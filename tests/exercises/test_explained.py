@@ -517,6 +517,14 @@ def test_one_less_than_a_number_is_told_so_that_its_square_is_plain():
     assert words.endswith("times the square of one less than the number of entries of `x`")
 
 
+def test_the_last_of_several_rows_is_told_however_many_there_are_and_a_name_keeps_its_letter():
+    draws = tuple(lambda rng, n=n: (rng.normal(size=(n, 2)),) for n in (2, 5, 4))
+    metric = metrics.Several(NUMBERS, NUMBERS, names=("x", "y"))
+    item = Exercise("ends", lambda v: (v[-1] * 2, v.sum()), draw=draws, metric=metric, hints=("a", "b", "c"))
+    text = item.judge(lambda v: (2 * v, v.sum())).text
+    assert text.endswith(" x: the expected result is the last entry or row of what you return.")
+
+
 def test_a_part_is_told_where_it_is_all_of_it_on_some_draws():
     draws = tuple(lambda rng, n=n: (rng.normal(size=n),) for n in (2, 5, 4))
     item = Exercise("whole", lambda v: np.exp(v) * v.sum(), draw=draws, metric=NUMBERS, hints=("a", "b", "c"))

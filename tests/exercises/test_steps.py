@@ -723,20 +723,47 @@ def test_what_is_changed_or_bound_again_is_not_called_right(monkeypatch, body):
     assert "`x`" not in judged(asked(reference, lambda rng: tuple(rng.normal(size=(2, 3)))), body)
 
 
-@pytest.mark.parametrize(
-    "body",
-    [
-        "from scipy.optimize import minimize\nreturn minimize(lambda v: v @ v, np.ones(3)).x",
-        "from scipy.optimize import minimize\nv = np.ones(3)\nreturn minimize(lambda v: v @ v, v).x",
-        "rows = [[x] for x in np.sin(a + b)]\nreturn np.hstack(rows)",
-    ],
-    ids=["start", "start that is bound", "in another shape"],
-)
-def test_where_a_search_begins_and_the_result_in_another_shape_are_not_blamed(monkeypatch, body):
-    """The right result in their place would be right as well, whatever is wrong."""
-    reference = solved_by(monkeypatch, "def formula(a, b):\n    x = np.exp(a)\n    return x * b / (x @ b)\n")
+def test_the_result_in_another_shape_is_not_blamed(monkeypatch):
+    """That its numbers are wrong is known already."""
+    reference = solved_by(monkeypatch, "def formula(a, b):\n    x = np.exp(a)[:, None]\n    return x[:, 0]\n")
+    for other in ("words", "partly_words"):
+        monkeypatch.setattr(steps.Search, other, lambda self, *of: None)
+    body = "rows = np.sin(a + b)[:, None]\nreturn np.hstack(rows)"
     told = judged(asked(reference, lambda rng: tuple(rng.uniform(1, 2, size=(2, 3)))), body)
     assert "With the right value there" not in told
+
+
+@pytest.mark.parametrize(
+    "body, lines",
+    [
+        ("v = a\nw = 2\nreturn solve(lambda v: v, v, tol=1e-3)", {2, 4}),
+        ("g = lambda v: v\nreturn solve(\n    g,\n    [0, 1])", {5}),
+        ("return list(map(lambda k: k, range(3)))", set()),
+        ("return solve(a, b)", set()),
+    ],
+)
+def test_lines_in_which_stands_where_a_search_begins(body, lines):
+    assert rerun.written(typed(body)).searched == lines
+
+
+@pytest.mark.parametrize(
+    "body, other",
+    [
+        ("from scipy.optimize import fsolve\nreturn fsolve(lambda v: v**3 - a, np.zeros(1))[0]", "ones"),
+        ("from scipy.optimize import fsolve\nv = np.zeros(1)\nreturn fsolve(lambda v: v**3 - a, v)[0]", "ones"),
+        ("return np.cbrt(a) * np.trace(np.diag([a, b])) / 2", "ones of its shape"),
+    ],
+    ids=["start", "start that is bound", "as good as no factor"],
+)
+def test_another_start_mends_by_luck_and_no_weights_stand_alone_in_a_call(body, other):
+    item = replace(asked(lambda a, b: np.cbrt(a), two_numbers), metric=metrics.Numbers(1e-6))
+    assert other not in judged(item, body)
+
+
+def test_a_number_that_cancels_is_not_what_belongs():
+    changes = mutation.mending(ast.parse("def f(a, b):\n    return g(a / 2, b / 2)").body[0])
+    assert not [c.mends for c in changes if "minus belongs, and the same" in c.mends]
+    assert [c.mends for c in changes if "too many, and the same" in c.mends]
 
 
 @pytest.mark.parametrize(

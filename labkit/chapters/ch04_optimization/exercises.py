@@ -349,8 +349,8 @@ BESIDE_THE_RIM = (
     (opt.newton_step, "right, but not where the Newton point lies outside the radius by little:"),
     (lambda g, B: opt.cauchy_step(g, B, 1e9), "right, but not where the corner lies outside the radius by little:"),
 )
-ITERATE = metrics.Several(metrics.Numbers(1e-7), metrics.Numbers(1e-7), names=("x", "radius"))
-ITERATE_OF_ANY_SIZE = metrics.Several(*2 * (metrics.Numbers(1e-6, least=0.0),), names=("x", "radius"))
+ITERATE = metrics.Several(metrics.Numbers(1e-7), metrics.Numbers(1e-7), names=("x", "radius"), together=True)
+ITERATE_OF_ANY_SIZE = metrics.Several(*2 * (metrics.Numbers(1e-6, least=0.0),), names=("x", "radius"), together=True)
 
 
 def straight_path(rng, share):
@@ -832,6 +832,11 @@ CHAPTER = Chapter(
                     )
                 ),
                 Mistake(
+                    beyond.differences(lambda f, x, e, h: f(x + e) - f(x - e) / (2 * h)),
+                    "Division comes before subtraction: put the difference `f(x + h e) - f(x - h e)` in parentheses.",
+                    id="measured-parentheses",
+                ),
+                Mistake(
                     beyond.differences(lambda f, x, e, h: f(x + e) - f(x - e)),
                     "These are differences, not slopes: divide by the distance of the two places, 2h.",
                     id="measured-undivided",
@@ -991,6 +996,11 @@ CHAPTER = Chapter(
                     _hessian(second=(1.0, 2.0)), "The second well sits at (−1, −2): its offsets are x1 + 1 and x2 + 2."
                 ),
                 Mistake(_hessian(one=0.0), "The 1 in q = |x − c|² + 1 is missing."),
+                Mistake(
+                    _hessian(second=(1.0, 1.0)),
+                    "Both wells sit at (1, 1) here. The deeper one has its center at (−1, −2).",
+                    id="hessian-one-center",
+                ),
                 Mistake(
                     _hessian(bowl=0.0),
                     "Only the outer products are there. The part (2w/q²) I comes from differentiating x − c.",
@@ -1628,6 +1638,11 @@ CHAPTER = Chapter(
                     id="damped-marquardt",
                 ),
                 Mistake(
+                    lambda r, J, damping: opt.damped_step(r, J, damping * (J * J).sum() / J.shape[1]),
+                    "Your damping is scaled with the mean of the diagonal of JᵀJ. Here |h|² has one price, whatever J is: λ I.",
+                    id="damped-trace",
+                ),
+                Mistake(
                     lambda r, J, damping: opt.gauss_newton_step(r, J) / (1 + damping),
                     "You shortened the step of Gauss and Newton. Damping turns it as well: λ is added to the matrix before solving.",
                     id="damped-shortened",
@@ -2173,6 +2188,11 @@ CHAPTER = Chapter(
                     lambda: 15 / 16,
                     "That is the probability that one stand-in has not all landings right. Five were tried; at least one is to have them.",
                     id="luck-one-wrong",
+                ),
+                Mistake(
+                    lambda: 5 / 16 - 10 / 256,
+                    "This is the sum of all chances, less that of ten pairs. Where three stand-ins are right, too much is taken off: go by none of five.",
+                    id="luck-pairs",
                 ),
                 Mistake(
                     lambda: 5 / 32,
