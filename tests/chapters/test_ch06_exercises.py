@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labkit.chapters.ch06_tracker import exercises as ch06
-from labkit.exercises.outcome import CORRECT, NOT_YET
+from labkit.exercises.outcome import CORRECT, NOT_YET, RAISED
 from labkit.geometry import frames
 from labkit.geometry.lie import exp_so3, nearest_rotation
 from labkit.machines import arm, log
@@ -388,12 +388,53 @@ def test_what_is_told_of_a_wrong_answer_is_true_of_it(name, answer, said, unsaid
     assert all(said in text and unsaid not in text for text in told), told
 
 
-def test_a_lead_of_nearly_all_that_is_looked_for_is_asked_for():
-    def late(time, reference, delayed, max_offset):
-        found, step = ch06.time_offset(time, reference, delayed, max_offset), time[1] - time[0]
-        return abs(found) if abs(found) > max_offset - step else found
+def lag_by_squares(time, reference, delayed, max_offset, at_the_end, root=False):
+    """The lag by a parabola; `at_the_end` makes its middle of the place of the least cost and of the last place."""
+    step, n = time[1] - time[0], len(time)
+    most = round(max_offset / step)
+    pairs = (
+        (reference[max(0, -s) : n - max(0, s)], delayed[max(0, s) : n + min(0, s)]) for s in range(-most, most + 1)
+    )
+    cost = np.array([np.mean((d - r) ** 2) for r, d in pairs])
+    k = at_the_end(int(np.argmin(cost)), 2 * most)
+    left, middle, right = (np.sqrt(cost) if root else cost)[[k - 1, k, k + 1]]
+    return (k - most + 0.5 * (left - right) / (left - 2 * middle + right)) * step
 
-    assert all("by nearly as much" in text for text in texts("time_offset", late))
+
+@pytest.mark.parametrize(
+    "at_the_end, root, said",
+    [
+        (lambda k, last: min(k, last - 1), False, "leads by nearly as much"),
+        (lambda k, last: min(max(k, 1), last - 1), True, "the root of the mean of squares as well"),
+    ],
+)
+def test_a_vertex_at_the_end_and_one_of_roots_are_told(at_the_end, root, said):
+    told = texts("time_offset", functools.partial(lag_by_squares, at_the_end=at_the_end, root=root))
+    assert all(said in text for text in told), told
+
+
+def test_a_parabola_beyond_the_last_shift_is_none():
+    beyond = functools.partial(lag_by_squares, at_the_end=lambda k, last: max(k, 1))
+    assert all("lags by nearly as much" in text for text in texts("time_offset", beyond, RAISED))
+
+
+def test_a_vertex_beyond_the_last_shift_but_one_is_right():
+    within = functools.partial(lag_by_squares, at_the_end=lambda k, last: min(max(k, 1), last - 1))
+    texts("time_offset", within, CORRECT)
+
+
+def test_the_total_over_the_root_of_two_is_right_by_chance_alone():
+    outcome = ITEMS["halved"].judge(ch06.beyond.budget()[1] / np.sqrt(2))
+    assert outcome.status == NOT_YET and "chance" in outcome.text
+
+
+@pytest.mark.parametrize("part, name", [*enumerate("xyz")])
+def test_who_makes_one_part_positive_is_told_which(part, name):
+    def mean(q):
+        m = (q * np.where(q[:, part] < 0, -1, 1)[:, None]).mean(axis=0)
+        return m / np.linalg.norm(m)
+
+    assert all(f"You made {name} positive" in text for text in texts("mean_quaternion", mean))
 
 
 def test_six_equal_numbers_are_no_heights():

@@ -144,10 +144,13 @@ STOPS = [
                 "noise: compare all with one reading.",
                 id="mean_quaternion-plain-mean",
             ),
-            Mistake(
-                _unit_mean(lambda q: np.where(q[:, 0] < 0, -1.0, 1.0)),
-                "You made the first part positive. Where it is about 0, its sign is noise.",
-                id="mean_quaternion-first-part",
+            *(
+                Mistake(
+                    _unit_mean(lambda q, k=k: np.where(q[:, k] < 0, -1.0, 1.0)),
+                    f"You made {name} positive. Where it is about 0, its sign is noise: readings of one rotation get opposite signs.",
+                    id=f"mean_quaternion-{id}-part",
+                )
+                for k, (name, id) in enumerate((("x", "first"), ("y", "second"), ("z", "third")))
             ),
             Mistake(
                 lambda q: _unit_mean(lambda p: np.ones(len(p)))(q / q[:, 3:]),
@@ -183,6 +186,11 @@ STOPS = [
                 lambda q: (q * np.where(q @ q[0] < 0, -1.0, 1.0)[:, None]).mean(axis=0),
                 "The signs are right, but a mean of unit vectors that scatter is shorter than 1: divide it by its length.",
                 id="mean_quaternion-short",
+            ),
+            Mistake(
+                lambda q: (m := q * np.where(q @ q[0] < 0, -1.0, 1.0)[:, None]).sum(axis=0) / max(len(m) - 1, 1),
+                "The signs are right, but this is the sum over n - 1. A quaternion has length 1: divide by the length of the sum.",
+                id="mean_quaternion-one-less",
             ),
             Mistake(
                 lambda q: np.median(q * np.where(q @ q[0] < 0, -1.0, 1.0)[:, None], axis=0),
@@ -1176,6 +1184,12 @@ CELL = [
                 for source in ("scanner", "tip", "marks", "first reading")
             ),
             Mistake(lambda: budget()[1], "This is the total as it is.", id="halved-not"),
+            Mistake(
+                lambda: budget()[1] / np.sqrt(2),
+                "This is the total over the root of 2, as if each variance were halved. One of six sources alone gets better, by half of its standard "
+                "deviation: that the numbers are nearly equal is chance.",
+                id="halved-root-two",
+            ),
             Mistake(
                 lambda: float(np.hypot(budget()[1], np.sqrt(3) * budget()[0]["tracker"]) / 2),
                 "Here all sources are halved but the largest. It is the other way round.",

@@ -537,16 +537,19 @@ def periodic_curves(rng):
     return time, curve(time), curve(time - lag), (period - near - 6) * step
 
 
-def curves_at_the_limit(rng):
-    """Curves of which the later one leads, by nearly as much as is looked for: the best of all shifts is the first."""
+AT_THE_LIMIT = metrics.Numbers(2.5e-3, "s")  # a quarter of a sample: a parabola needs a shift beyond the last
+
+
+def curves_at_the_limit(rng, sign):
+    """Curves that lag (sign 1), or lead (-1), by nearly as much as is looked for: the best of all shifts is at the end."""
     step, samples, phase = 0.01, int(rng.integers(12, 20)), rng.uniform(0, 6, 2)
     time = rng.uniform(1, 50) + step * np.arange(int(rng.integers(200, 240)))
 
     def curve(t):
         return 1.2 + 0.6 * np.sin(4.1 * t + phase[0]) + 0.3 * np.sin(7.3 * t + phase[1])
 
-    lead = (samples - rng.choice([0.27, 0.33])) * step
-    return time, curve(time), curve(time + lead), (samples + 0.2) * step
+    lag = sign * (samples - rng.uniform(0.05, 0.12)) * step
+    return time, curve(time), curve(time - lag), (samples + 0.2) * step
 
 
 def noisy_curves(rng):
@@ -1116,6 +1119,15 @@ CHAPTER = Chapter(
                         "You made the first entry positive, but R[0, 0] may well be negative. The sign that a rotation needs is that of its determinant.",
                     )
                     for nearest in (lie.nearest_rotation, _orthonormal)
+                ),
+                *(
+                    Mistake(
+                        lambda M, nearest=nearest: nearest((v := _null(M)).reshape(3, 3, order="F") * np.sign(v.sum())),
+                        "You made the sum of the entries positive, but a rotation's may well be negative. The sign that it needs is that of its "
+                        "determinant.",
+                        id=f"rotation_from_nullvector-sum{words}",
+                    )
+                    for nearest, words in ((lie.nearest_rotation, ""), (_orthonormal, "-as-it-comes"))
                 ),
                 *(
                     Mistake(
@@ -1909,12 +1921,13 @@ CHAPTER = Chapter(
                     metrics.Numbers(6e-4, "s"),
                     "Right where the curves match at one shift. Where they repeat, and match at one within max_offset and at another beyond it:",
                 ),
-                (
-                    curves_at_the_limit,
-                    metrics.Numbers(
-                        6e-3, "s"
-                    ),  # half a sample: to one side of the first shift there is none for a parabola
-                    "Right for offsets well within max_offset. For a tracker that leads by nearly as much:",
+                *(
+                    (
+                        functools.partial(curves_at_the_limit, sign=sign),
+                        AT_THE_LIMIT,
+                        f"Right for offsets well within max_offset. For a tracker that {does} by nearly as much:",
+                    )
+                    for sign, does in ((-1, "leads"), (1, "lags"))
                 ),
                 (
                     noisy_curves,
@@ -2007,8 +2020,9 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _least(_distances, True),
-                    "An absolute difference has a corner at its least, and a parabola does not fit a corner: the result is off by a part of a "
-                    "sample. Square the differences.",
+                    "The mean of absolute differences has a corner at its least, the root of the mean of squares as well, and a parabola fits no "
+                    "corner: the result is off by a part of a sample. Take the mean of the squares, without a root.",
+                    id="time_offset-6fe11a",
                 ),
                 Mistake(
                     lambda t, r, d, m: time_offset(t, r, d, m) + m,
