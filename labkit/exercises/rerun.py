@@ -20,7 +20,7 @@ import numpy as np
 from . import guard, mutation
 
 NOTE, TICK = "_labkit_note_", "_labkit_tick_"
-ROUNDS = 12  # values of one place that are kept: it may stand in a loop
+ROUNDS = 16  # values of one place that are kept: it may stand in a loop
 ENTRIES = 5000  # of an array that is kept
 LENGTH = 60  # characters of code that are quoted
 PATIENCE = 5  # times as many steps as the function itself takes may a changed one take ...

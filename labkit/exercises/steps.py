@@ -700,11 +700,14 @@ class Search:
     # What agrees with the solution
 
     @_or_nothing
-    def passed_words(self, solution):
-        """A value on the way that is the right result already, though it is not what is returned."""
+    def passed_words(self, solution, operands=False):
+        """A value on the way that is the right result already, though it is not what is returned; of the operands of
+        larger parts only where these are asked for: that (I - K H) P is right does not say what is wrong with
+        (I - K H) P (I - K H).T - K R K.T.
+        """
         results = [q for q in solution.distinct if solution.is_result[q]] if solution else []
         for k in range(len(self.written.places)):
-            if self._is_returned(k):
+            if self._is_returned(k) or self._is_operand(k) and not operands:
                 continue  # the same but for rounding, and not right on every draw
             q = next((q for q in results if self._is_value(k, [values[q][1] for values in solution.values])), None)
             if q is not None:
@@ -714,6 +717,18 @@ class Search:
                 each = (self._in_which_round(k) if theirs else ", a part of it in each round") if mine else ""
                 return f"{self._where(k)}, stands the right result{each}, but something else is returned"
         return None
+
+    def _is_operand(self, k):
+        """Whether a value is one side of a sum, a product or the like in its line."""
+        line, code, *_ = self.written.places[k]
+        larger = (text for at, text, _, _, first in self.written.places[k + 1 :] if at == line and first <= k)
+        around = next(larger, "").rpartition(" = ")[2]
+        try:
+            part, value = (ast.parse(text, mode="eval").body for text in (around, code))
+        except SyntaxError:  # quoted in part, or a step
+            return False
+        sides = (part.left, part.right) if isinstance(part, ast.BinOp) else ()
+        return any(ast.unparse(side) == ast.unparse(value) for side in sides)
 
     def _in_which_round(self, k):
         """In which round a value is the right result: it need not be the last, of which there may be more than kept."""

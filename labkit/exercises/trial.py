@@ -93,6 +93,7 @@ class Trial(Raised, Staying):
         nearer = search and not step and search.nearer_words()  # now, as above
         solution = search and not step and self._solution(search)
         step = step or search and (search.passed_words(solution) or search.notebook_words(solution) or search.words())
+        step = step or search and search.passed_words(solution, True)
         shape = self._other_shape() if self.refusal else ""
         words = words or (not self.refusal and step) or (not shape and not step and (unmoved or self._one_change()))
         if words:

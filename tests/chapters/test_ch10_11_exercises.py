@@ -400,6 +400,10 @@ def half_unit(printed):
 """
 OF_THE_FLOAT = "def half_unit(printed):\n    return 0.5 * np.spacing(float(printed.replace(',', '.')))"
 ONE_SHARE = "def left_out(r, J):\n    return r / (1 - max(np.diag(J @ np.linalg.pinv(J))))"
+JOSEPH = """def with_one_more(C, J):
+    K = C @ J.T @ np.linalg.inv(J @ C @ J.T + np.eye(len(J)))
+    M = np.eye(len(C)) - K @ J
+    return M @ C @ M.T - K @ K.T"""
 SHRINKING = "def with_one_more(C, J):\n    return np.linalg.inv(np.eye(len(C)) + C @ J.T @ J)"
 SMALLEST_NORM = """
 def next_pose(C, candidates):
@@ -431,6 +435,7 @@ def motions(F, S):
         (ledger, "half_unit", OF_THE_FLOAT, "too small on every draw"),
         (own, "left_out", ONE_SHARE, "the largest share for all"),
         (own, "with_one_more", SHRINKING, "(I - K J) C"),
+        (own, "with_one_more", JOSEPH, "minus stands where plus belongs"),
         (own, "next_pose", SMALLEST_NORM, "of the smallest norm"),
         (ledger, "bound", TYPED_HALVES, "this value is not right"),
         (

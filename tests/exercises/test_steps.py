@@ -1160,7 +1160,7 @@ def test_what_is_right_after_the_last_round_is_no_part_of_the_result_in_each():
 
 ROOT = """
 x = b
-for _ in range(15):
+for _ in range(20):
     x = (x + a / x) / 2
 return x
 """

@@ -859,7 +859,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _covariance(lambda r, n: 0.0),
-                    "Your covariance is 0. So is the square of the residuals' sum, as those of least squares add up to 0: sum the squares.",
+                    "Your covariance is 0. Are the residuals added up before they are squared? Those of least squares add up to 0: sum "
+                    "the squares. Or does an array of integers cut it off to 0?",
                     id="covariance-0",
                 ),
                 Mistake(
