@@ -68,7 +68,7 @@ class Raised(Explanations):
             )
         if isinstance(error, SystemExit):
             return self.outcome(NOT_YET, "your code calls exit(): a function ends with `return`.")
-        if isinstance(error, TypeError) and not run.line and "argument" in run.said:
+        if isinstance(error, TypeError) and not run.line and re.search(r"(?<!\(\) )argument", run.said):
             wanted = ", ".join(self._names(args) if args else self.exercise.arguments)
             return self.outcome(NOT_YET, f"your function cannot be called with ({wanted}): {run.said}.")
         if isinstance(error, NameError) and error.name:
@@ -80,9 +80,10 @@ class Raised(Explanations):
         said = run.said or WORDLESS.get(type(error), "" if isinstance(error, AssertionError) else "it says no more")
         if isinstance(error, AssertionError) and not said:
             said = "`assert` raises; an answer is handed over with `return`"
+        if not (args or run.line):
+            where = f"{type(error).__name__}: {said}"
+            return self.outcome(NOT_YET, closed(f"what your function returned could not be worked with: {where}"))
         advice = self._advice(error, args, said)
-        if not (advice or args or run.line):
-            advice = ". What your function returned could not be worked with."
         where = f"\nin {run.line}" if run.line else ""
         return self.outcome(RAISED, f"{type(error).__name__}: {said}{advice}{where}{self._given(run, args, words)}")
 

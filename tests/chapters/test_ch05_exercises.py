@@ -220,7 +220,12 @@ def test_step_two_of_li_hears_all_poses_and_takes_any_least_squares(seed):
 
 
 @pytest.mark.parametrize(
-    "of, told", [(lambda T, T_FS: T @ T_FS, "the scanner's poses"), (lambda T, T_FS: frames.invert(T), "inverse poses")]
+    "of, told",
+    [
+        (lambda T, T_FS: T @ T_FS, "the scanner's poses"),
+        (lambda T, T_FS: frames.invert(T), "inverse poses"),
+        (lambda T, T_FS: (T, T_FS), "hand over the poses alone"),
+    ],
 )
 def test_good_poses_of_another_frame_are_told_as_such(of, told):
     def poses(T_FS, target, rng):

@@ -692,8 +692,11 @@ def test_what_raises_in_a_property_is_told_by_the_students_line():
     )
     assert 'raise ValueError("no")' in stochastic.judge(failing).text
     picky, cell = replace(stochastic, draws=0), {}
-    exec(compile("number = lambda v: len(v)\nalone = lambda: 1", "<cell>", "exec"), cell)
-    assert "could not be worked with" in picky.judge(cell["number"]).text
+    exec(compile("number = lambda v: len(v)\nalone = lambda: 1\nnothing = lambda v: {}", "<cell>", "exec"), cell)
+    picked = picky.judge(cell["number"])
+    assert picked.status == NOT_YET and picked.text.startswith("what your function returned could not be worked with: ")
+    converted = replace(picky, properties=(lambda student, rng: float(student(np.ones(3))) or None,))
+    assert "worked with: TypeError: float() argument" in converted.judge(cell["nothing"]).text
     assert "cannot be called with (v)" in picky.judge(cell["alone"]).text
 
 

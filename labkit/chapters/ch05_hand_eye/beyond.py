@@ -424,6 +424,11 @@ ACCURACY = [
                 id="accuracy-sum",
             ),
             Mistake(
+                lambda command, reached: np.abs(reached.mean(0) - command).mean(),
+                "This is the mean of the absolute parts. A distance is the root of the sum of squares.",
+                id="accuracy-mean-of-parts",
+            ),
+            Mistake(
                 lambda command, reached: np.abs(reached.mean(0) - command).max(),
                 "This is the largest of the parts. A distance is the root of the sum of all their squares.",
                 id="accuracy-largest",
@@ -1153,10 +1158,13 @@ LITERATURE = [
                 "These are the equations of X A = B X. A and B have changed sides: A X = X B.",
                 id="kim-sides",
             ),
-            Mistake(
-                lambda A, B: (literature.kim_matrix(A, B)[0], _moved(B)),
-                "F holds the last column of B. The 1 in X's last row meets the last column of A.",
-                id="kim-F-of-B",
+            *(
+                Mistake(
+                    lambda A, B, sign=sign: (literature.kim_matrix(A, B)[0], sign * _moved(B)),
+                    "F holds the last column of B. The 1 in X's last row meets the last column of A.",
+                    id=f"kim-F-of-B{also}",
+                )
+                for sign, also in ((1, ""), (-1, "-plus"))
             ),
         ],
     ),

@@ -742,13 +742,23 @@ def design_is_good(student, rng):
     """What the poses of the exercise must fulfil, for three scanners; a sentence when they do not."""
     for _ in range(3):
         T_FS, target, chance = scanner_and_sphere(rng)
-        problem = _problem_of_design(np.asarray(student(T_FS.copy(), target.copy(), chance), dtype=float), T_FS, target)
+        problem = _problem_of_design(_poses_alone(student(T_FS.copy(), target.copy(), chance)), T_FS, target)
         if problem:
             return problem
     return None
 
 
+def _poses_alone(designed):
+    """What was designed as an array; None where it is several results, or no numbers."""
+    try:
+        return np.asarray(designed, dtype=float)
+    except (TypeError, ValueError):
+        return None
+
+
 def _problem_of_design(T_BF, T_FS, target):
+    if T_BF is None:
+        return "expected one array of shape (31, 4, 4), got something else: hand over the poses alone."
     if T_BF.shape != (31, 4, 4):
         return f"31 poses are wanted, shape (31, 4, 4); got {T_BF.shape}."
     try:
@@ -1416,6 +1426,9 @@ CHAPTER = Chapter(
                 Mistake(_weights(lambda r: np.clip(1 - r / (5 * np.median(r) / robust.MEDIAN_CHI3), 0, None) ** 2), "Inside the bracket u is squared: (1 - u^2)^2."),
                 Mistake(_weights(lambda r: np.minimum(1, np.median(r) / robust.MEDIAN_CHI3 * 1.345 / r)), "These are Huber's weights, which never reach zero. Tukey's do: (1 - u^2)^2 below u = 1, else 0."),
                 Mistake(_weights(lambda r: np.minimum(1, np.median(r) / robust.MEDIAN_CHI3 * 5 / r)), "These are Huber's weights, which never reach zero. Tukey's do: (1 - u^2)^2 below u = 1, else 0.", id="robust_weights-huber-5"),
+                *(Mistake(_weights(lambda r, power=power: np.exp(-power * (r / (5 * np.median(r) / robust.MEDIAN_CHI3)) ** 2)), "Weights of this kind (Welsch) never reach zero. Tukey's do: (1 - u^2)^2 below u = 1, else 0.", id=f"robust_weights-welsch-{power:g}")
+                  for power in (1, 0.5)),
+                Mistake(_weights(lambda r: 1 / (1 + (r / (5 * np.median(r) / robust.MEDIAN_CHI3)) ** 2)), "These are Cauchy's weights, which never reach zero. Tukey's do: (1 - u^2)^2 below u = 1, else 0.", id="robust_weights-cauchy"),
                 Mistake(_weights(lambda r: _tukey(r * robust.MEDIAN_CHI3 / np.median(r))), "The factor 5 is missing: u = length / (5 s)."),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) * robust.MEDIAN_CHI3))), "You multiplied by 1.538: divide the median by it."),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.sort(r)[len(r) // 2] / robust.MEDIAN_CHI3))),
