@@ -2,6 +2,7 @@
 
 import copy
 import functools
+import re
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from .results import Refusal, admitted_by, equal_as_written, failure_of
 
 FEW = 3  # draws on which two rules may well give the same, where they are right on the others
 ONCE_MORE = 5  # plain draws on which a mistake is to show as well: those of one check may all be of one kind by chance
+BESIDE = re.compile(
+    r"The [a-z ]+ (?:is|are) right(\. |; |, but )"
+)  # said of the other results, where one alone is wrong
 MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
 
 
@@ -97,10 +101,10 @@ class Named(Evidence):
         for part, (name, metric, _, _) in enumerate(self.exercise.metric.parts(*cases[0][2])):
             if all(metric.equal(pair[0][part], pair[1][part]) for _, _, pair in cases):
                 continue
-            k = next((k for k in range(len(self.exercise.mistakes)) if self._is_slip_of(k, part, metric, cases)), None)
+            k = self._slip_of(part, metric, cases)
             if k is None:
                 return None
-            texts[name], first = self.exercise.mistakes[k].text, k if first is None else first
+            texts[name], first = _of_one_result(self.exercise.mistakes[k].text), k if first is None else first
         words = "\n".join(f"{name}: {text}" for name, text in texts.items())
         return self.outcome(NOT_YET, words, first) if len(texts) > 1 else None
 
@@ -115,6 +119,12 @@ class Named(Evidence):
             if all(self._is_mistake(mistake, *draw) for draw in draws):
                 return mistake.text
         return None
+
+    def _slip_of(self, part, metric, cases):
+        """Which mistake one part of the results is on all draws, rather one of this part alone; None if it is none."""
+        slips = [k for k in range(len(self.exercise.mistakes)) if self._is_slip_of(k, part, metric, cases)]
+        alone = (k for k in slips if BESIDE.match(self.exercise.mistakes[k].text))
+        return next(alone, slips[0] if slips else None)
 
     def _is_slip_of(self, k, part, metric, cases):
         """Whether one part of the results is that of mistake k on all draws."""
@@ -135,3 +145,10 @@ class Named(Evidence):
                 return equal_as_written(metric, result, wrong)
         except Exception:  # a wrong variant may well fail on a draw: then the answer is not this mistake
             return False
+
+
+def _of_one_result(text):
+    """A mistake's text without the words that all else is right, where other results are wrong as well."""
+    found = BESIDE.match(text)
+    rest = text[found.end() :] if found else text
+    return rest if found is None or found[1] == ". " else rest[0].upper() + rest[1:]

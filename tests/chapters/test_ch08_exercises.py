@@ -70,6 +70,21 @@ def test_what_one_size_or_one_limit_hides_is_named(name, answer, words):
     assert status == NOT_YET and all(words in text for text in texts), texts
 
 
+def mean_and_sum(x0, var0, z, stds):
+    return np.mean([x0, *z]), var0 + np.sum(stds**2)
+
+
+def neither_corrected(x, cov, z, C, cov_z):
+    K = cov @ C.T @ np.linalg.inv(C @ cov @ C.T + cov_z)
+    return x, (np.eye(len(x)) + K @ C) @ cov
+
+
+@pytest.mark.parametrize("name, answer", [("fuse_two_sensors", mean_and_sum), ("update", neither_corrected)])
+def test_of_two_wrong_results_none_is_said_to_be_right(name, answer):
+    status, texts = judged(name, answer)
+    assert status == NOT_YET and all(": The " in text and "is right" not in text for text in texts), texts
+
+
 def test_an_inverse_written_for_two_rows_meets_three():
     def by_hand(y, S, limit):
         (a, b), (c, d) = S
