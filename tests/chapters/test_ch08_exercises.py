@@ -456,7 +456,7 @@ def in_degrees_and_half_of_what_is_large(x0, cov0, z, C, cov_z):
         ("fuse_two_sensors", first_gain_twice, "The second sensor gets the gain of the first"),
         ("batch_estimate", rows_repeated, "np.tile"),
         ("gate", two_slips, "Two slips"),
-        ("predict_state", scaled_by_the_control, "but ones of its shape in its place"),
+        ("predict_state", scaled_by_the_control, "`U = np.diag(u)`: the identity belongs on the right side"),
         (
             "fuse_two_sensors",
             inflated_by_the_readings,
