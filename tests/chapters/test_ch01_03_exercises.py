@@ -177,6 +177,7 @@ def test_an_arccosine_of_more_than_1_names_its_argument(cosine):
 
 
 library_angles = frames.kuka_from_matrix  # by this name a checked function may call it
+library_pose = frames.matrix_from_kuka
 FRAMES = {item.id: item for item in ch01_exercises.CHAPTER.items}
 
 
@@ -312,6 +313,10 @@ def test_what_is_said_is_true_of_whatever_gives_the_result(name, answer, told, u
     assert told in text and untrue not in text
 
 
+def test_what_stands_in_an_array_is_told_where_it_is_no_number():
+    assert "got an array of text" in judged("read_system", lambda text: np.array([text.split()[:3]] * 3)).text
+
+
 def test_a_heading_is_told_that_it_needs_a_mark():
     told = judged("write_system", lambda points: "x y z\n" + beyond.write_system(points)).text
     assert "A heading needs a # before it" in told
@@ -342,7 +347,7 @@ def test_the_worst_direction_is_the_one_an_optimizer_finds():
 
 
 def upward(a, b):
-    R = frames.gram_schmidt(a, b)
+    R = made_frame(np.zeros(3), a, b)[:3, :3]
     return R * (1, 1, -1 if R[2, 2] < 0 else 1)
 
 
@@ -683,33 +688,45 @@ def framed(gram_schmidt):
 
 
 def of_turned_poses(T):
-    return T if np.allclose(T[:3, :3], np.eye(3)) else frames.invert(T)
+    return T if np.allclose(T[:3, :3], np.eye(3)) else np.linalg.inv(T)
 
 
 def by_first_order(T):
-    return 2 * np.eye(4) - T if np.abs(T - np.eye(4)).max() < 0.02 else frames.invert(T)
+    return 2 * np.eye(4) - T if np.abs(T - np.eye(4)).max() < 0.02 else np.linalg.inv(T)
 
 
 def of_frames_turned_apart(T_WA, T_WB):
     if np.allclose(T_WA[:3, :3], T_WB[:3, :3]):
         return frames.pose(np.eye(3), T_WB[:3, 3] - T_WA[:3, 3])
-    return frames.relative(T_WA, T_WB)
+    return np.linalg.inv(T_WA) @ T_WB
+
+
+def of_frames_a_step_apart(T_WA, T_WB):
+    return np.eye(4) if np.allclose(T_WA, T_WB) else np.linalg.inv(T_WA) @ T_WB
+
+
+def none_where_hardly_any(T):
+    angle = np.linalg.norm(Rotation.from_matrix(T[:3, :3]).as_rotvec())
+    return (0.0, 0.0) if np.allclose(T, np.eye(4), atol=1e-3) else (angle, np.linalg.norm(T[:3, 3]))
 
 
 def pole_from_a_thousandth(T):
-    found, R = frames.kuka_from_matrix(T), T[:3, :3]
+    found, R = library_angles(T), T[:3, :3]
     if np.hypot(R[0, 0], R[1, 0]) < 1e-3:
         found[3], found[5] = 0, np.arctan2(-R[1, 2], R[1, 1])
     return found
 
 
+library_closure, library_repair = chaining.closure_error, chaining.orthonormalize
+
+
 def without_small_angles(T):
-    angle, distance = chaining.closure_error(T)
+    angle, distance = library_closure(T)
     return (0.0 if np.cos(angle) > 0.99999 else angle), distance
 
 
 def as_good_as_orthonormal(T):
-    return T.copy() if abs(np.linalg.det(T[:3, :3]) - 1) < 1e-5 else chaining.orthonormalize(T)
+    return T.copy() if abs(np.linalg.det(T[:3, :3]) - 1) < 1e-5 else library_repair(T)
 
 
 def by_the_axis_of_the_gap(transforms):
@@ -722,19 +739,19 @@ def by_the_axis_of_the_gap(transforms):
 
 
 def of_frames_apart(T_WA, T_WB):
-    return np.eye(4) if np.allclose(T_WA, T_WB, atol=1e-2) else frames.relative(T_WA, T_WB)
+    return np.eye(4) if np.allclose(T_WA, T_WB, atol=1e-2) else np.linalg.inv(T_WA) @ T_WB
 
 
 def without_small_turns(xyzabc):
-    return frames.matrix_from_kuka(np.where(np.arange(6) < 3, xyzabc, np.where(abs(xyzabc) < 1e-3, 0, xyzabc)))
+    return library_pose(np.where(np.arange(6) < 3, xyzabc, np.where(abs(xyzabc) < 1e-3, 0, xyzabc)))
 
 
 def within_half_a_turn(xyzabc):
-    return frames.matrix_from_kuka(np.concatenate([xyzabc[:3], np.clip(xyzabc[3:], -np.pi, np.pi)]))
+    return library_pose(np.concatenate([xyzabc[:3], np.clip(xyzabc[3:], -np.pi, np.pi)]))
 
 
 def angles_of_four_decimals(T):
-    xyzabc = frames.kuka_from_matrix(T)
+    xyzabc = library_angles(T)
     return np.concatenate([xyzabc[:3], xyzabc[3:].round(4)]) if T[0, 0] > 0.99999 else xyzabc
 
 
@@ -759,6 +776,8 @@ def of_several(distances, scale):
         ("invert", of_turned_poses),
         ("invert", by_first_order),
         ("relative", of_frames_turned_apart),
+        ("relative", of_frames_a_step_apart),
+        ("closure_error", none_where_hardly_any),
         ("kuka_from_matrix", pole_from_a_thousandth),
         ("closure_error", without_small_angles),
         ("orthonormalize", as_good_as_orthonormal),
@@ -766,8 +785,8 @@ def of_several(distances, scale):
     ],
 )
 def test_what_is_nearly_a_special_case_is_drawn(name, answer, seed):
-    item = {**FRAMES, **ITEMS}[name]
-    assert item.judge(answer, rng=np.random.default_rng(seed)).status != CORRECT
+    outcome = {**FRAMES, **ITEMS}[name].judge(answer, rng=np.random.default_rng(seed))
+    assert outcome.status != CORRECT and "the library's" not in outcome.text
 
 
 def test_a_part_of_the_text_that_is_nearly_right_is_told_in_words():

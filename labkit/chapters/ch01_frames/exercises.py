@@ -335,6 +335,12 @@ def _turn(axis, angle):
     return frames.matrix_from_kuka(np.concatenate([np.zeros(3), abc]))[:3, :3]
 
 
+def _turned_back(*axes):
+    """A pose with these of its three turns the other way."""
+    signs = np.array([1, 1, 1, *(-1 if axis in axes else 1 for axis in "zyx")])
+    return lambda xyzabc: frames.matrix_from_kuka(xyzabc * signs)
+
+
 def _ry_reversed(xyzabc):
     return frames.matrix_from_kuka(xyzabc * np.array([1, 1, 1, 1, -1, 1]))
 
@@ -516,6 +522,11 @@ def _affine_first(handed):
         return frames.pose(R, q.mean(0) - R @ p.mean(0))
 
     return variant
+
+
+def _turned_as_three_points(p, q):
+    R = (frames.frame_from_points(*q[:3]) @ frames.invert(frames.frame_from_points(*p[:3])))[:3, :3]
+    return frames.pose(R, q.mean(0) - R @ p.mean(0))
 
 
 def _about_the_first_point(p, q):
@@ -1029,6 +1040,14 @@ CHAPTER = Chapter(
                     "The lever is multiplied by an angle in degrees here: arcs take radians.",
                     id="distance-degrees",
                 ),
+                *(
+                    Mistake(
+                        lambda part=part: HOLE * abs(part * np.sin(np.rad2deg(_missing()) / part)),
+                        "The angle that is missing is in degrees here, and its sine is taken as if it were in radians: np.deg2rad comes first.",
+                        id=f"distance-sine-of-degrees-{part}",
+                    )
+                    for part in (1, 2)
+                ),
                 Mistake(
                     lambda: np.linalg.norm(_hole() - _hole_as_drawn()) ** 2,
                     "This is the squared distance.",
@@ -1203,6 +1222,20 @@ CHAPTER = Chapter(
                 ),
                 *(
                     Mistake(
+                        _turned_back(*wrong),
+                        f"Your {words} turn the wrong way: the minus before the sine stands top right in Rz, "
+                        "bottom left in Ry, and above the diagonal in Rx.",
+                        id=f"kuka-turned-back-{''.join(wrong)}",
+                    )
+                    for wrong, words in (
+                        ("zyx", "Rz, Ry and Rx"),
+                        ("zy", "Rz and Ry"),
+                        ("zx", "Rz and Rx"),
+                        ("yx", "Ry and Rx"),
+                    )
+                ),
+                *(
+                    Mistake(
                         _never_negative(3 + k, sine),
                         f"Your {word} of {angle} is never negative, as a root of 1 less a square is: take np.{word[:3]}.",
                         id=f"kuka-positive-{word}-{angle}",
@@ -1346,6 +1379,11 @@ CHAPTER = Chapter(
                     lambda T: np.array([*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_euler("XYZ")[::-1]]),
                     "These are turns about x, then the new y, then the new z. KUKA's order is z, y, x.",
                 ),
+                Mistake(
+                    lambda T: np.array([*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_rotvec()]),
+                    "These are the entries of the rotation vector, of one turn about one axis. A, B, C are three turns, about z, then y, then x.",
+                    id="kuka-read-rotvec",
+                ),
                 Mistake(_angles(lambda abc: abc * (1, -1, 1)), "B has the wrong sign: the entry r20 is -sin B."),
                 Mistake(
                     lambda T: frames.kuka_from_matrix(_with(T, R=T[:3, :3].T)),
@@ -1408,6 +1446,11 @@ CHAPTER = Chapter(
                     "The sign belongs to the last column, that of the smallest singular value: there it costs least.",
                 ),
                 Mistake(
+                    _kabsch(handed=lambda U, V: V @ np.diag([1, 1, -1]) @ U.T),
+                    "The last column of V changes its sign everywhere. It must where V Uᵀ is a mirror image (det = -1), and nowhere else.",
+                    id="fit-frame-sign-everywhere",
+                ),
+                Mistake(
                     _kabsch(handed=lambda U, V: np.diag([1, 1, np.linalg.det(V @ U.T)]) @ V @ U.T),
                     "You turned the last row of V Uᵀ. Where it is a mirror image, the last column of V changes its sign, before Uᵀ is multiplied.",
                     id="fit_frame-last-row",
@@ -1442,6 +1485,11 @@ CHAPTER = Chapter(
                 Mistake(
                     _kabsch(shift=lambda R, p, q: q[0] - R @ p[0]),
                     "The rotation is right. You put the first point exactly: the means are to fall together.",
+                ),
+                Mistake(
+                    _turned_as_three_points,
+                    "Your rotation is that of a frame through the first three points of each set. All points count, and all alike.",
+                    id="fit-frame-turned-as-three",
                 ),
                 Mistake(
                     _about_the_first_point,

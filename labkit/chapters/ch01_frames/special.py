@@ -164,6 +164,10 @@ FRAMES = (
         for k in (0, 1)
     ),
     ("of two frames in one place, turned apart", functools.partial(beside, angle=1.4, reach=0.0)),
+    (
+        "of two frames turned alike, a thousandth of a millimeter apart",
+        functools.partial(beside, angle=0.0, reach=1e-3),
+    ),
     ("of two frames turned nearly alike, far apart", functools.partial(beside, angle=6e-4, reach=500.0)),
     ("of two frames turned apart by less than 90 deg", functools.partial(beside, angle=1.2, reach=500.0)),
     ("of two frames turned apart by half a turn", functools.partial(beside, angle=HALF, reach=500.0)),

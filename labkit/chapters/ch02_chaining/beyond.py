@@ -220,7 +220,8 @@ def names_the_line(student, rng):
 
 
 LONGEST = 150  # characters of a sentence that are shown
-ACCEPTED = "that must raise a ValueError, yours returned something."
+REFUSED = "that must raise a ValueError"
+ACCEPTED = f"{REFUSED}, yours returned without one."
 
 
 def _misplaced(student, above, good):
@@ -274,7 +275,7 @@ def _refusal(student, lines, words):
     except ValueError as refusal:
         return str(refusal)
     except Exception as error:
-        error.given = words
+        error.given = f"{words}: {REFUSED}"
         raise
     return None
 
@@ -347,7 +348,7 @@ FILES = [
         draw=lambda rng: (system(rng),),
         fixed={"points": "a system is always three points"},
         metric=reads_back(),
-        noisy=(system_near_0, reads_back(), "right, but not of numbers near 0:"),
+        noisy=(system_near_0, reads_back(), "right, but not of very small and very large numbers:"),
         properties=(right_where(write_system, reads_back(), *SIZES),),
         hints=(
             "One line a point, blanks in between. How many digits does a double need so that none is lost?",
@@ -373,6 +374,19 @@ FILES = [
                 _written(".3f"),
                 "Three decimals look tidy and lose the rest. Take 17 significant digits, or `repr`.",
                 id="write-three",
+            ),
+            Mistake(
+                lambda points: write_system(points[::-1]),
+                "The points stand in reverse order. The origin comes first, then x_point, then y_point.",
+                id="write-reversed",
+            ),
+            *(
+                Mistake(
+                    _written(form),
+                    f"`{form}` keeps {digits} significant digits: what is read back is another number. It takes 17, as `.16e` has them, or `repr`.",
+                    id=f"write-{digits}-with-exponent",
+                )
+                for form, digits in (("e", 7), (".10e", 11), (".12e", 13))
             ),
             Mistake(
                 _written("g"),

@@ -1021,7 +1021,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _svd_variant(lambda U, s, Vt: U @ np.diag(s) @ Vt),
-                    "This is R, as worn as before: U S Vᵀ puts it together again. Leave the singular values out.",
+                    "This is R, as worn as before. (U S Vᵀ puts it together again: leave the singular values out.)",
+                    id="orthonormalize-729c13",
                 ),
                 Mistake(
                     _svd_variant(lambda U, s, Vt: Vt @ U),

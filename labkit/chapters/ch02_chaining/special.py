@@ -77,6 +77,7 @@ PRODUCTS = tuple(
         ("turns by nearly half a turn", dict(angle=3.08)),
         ("is half a turn", dict(angle=HALF)),
         ("turns by a few millionths of a radian", dict(angle=4e-6)),
+        ("turns by some thousandths of a degree and hardly shifts", dict(angle=4e-5, reach=4e-5)),
         ("shifts along x alone", dict(along=(1.0, 0.0, 0.0))),
         ("shifts against x, y and z", dict(along=(-1.0, -2.0, -1.5))),
         *((f"turns about {'xyz'[axis]} alone", dict(angle=2.0, axis=axis)) for axis in range(3)),
