@@ -590,7 +590,7 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
     ("its tangent belongs there", np.tan),
     ("its diagonal alone belongs there", lambda v: np.diag(np.diag(_square(v)))),
     ("its rotation belongs there transposed", lambda v: _pose(v, lambda R: np.swapaxes(R, -1, -2), _same)),
-    ("its translation has the wrong sign", lambda v: _pose(v, _same, np.negative)),
+    ("it belongs there with its translation negated", lambda v: _pose(v, _same, np.negative)),
     ("its translation does not belong there", lambda v: _pose(v, _same, np.zeros_like)),
     ("its rotation does not belong there", lambda v: _pose(v, lambda R: 0 * R + np.eye(3), _same)),
     *(

@@ -37,6 +37,7 @@ LIFTED = re.compile(  # what brings a number over a bound, whatever is wrong
 NAMES = re.compile(r"[^\W\d]\w*")
 FIRST_ROUND = "it is right in the first round, not in all behind it"
 ONE_ENTRY, ONE_ROW = re.compile(r"\bentry\b"), re.compile(r"\brow(?=s?\b)")  # of a value that has several rounds
+SUMMED = re.compile(r"\b(mean|sum|length|reverse)\b")
 COUNT = re.compile(r"^len\([^()]*\)$|\.shape\[-?\d\]$|\.size$")  # of which no half, root or sine is meant
 CHANCE = 1000  # one case of so many may be chance
 BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
@@ -407,6 +408,8 @@ class Search:
                     counted = SCALED.match(words) and COUNT.search(self.written.places[k][1])
                     if counted or bounded and words != rerun.SIGNLESS:
                         continue
+                    if SUMMED.search(words) and _is_fixed(self.written.places[k][1].rpartition(" = ")[2]):
+                        continue  # nobody sums up what is typed in, or turns it around
                     if words in rerun.WEIGHTS and value.ndim and self._is_weighed(k):
                         continue
                     if _changes(function, value, others) and not self._is_all_of_it(k, function, value, others):

@@ -1,5 +1,6 @@
 """Answers to chapters 2 and 3 that were once judged wrongly or told too little, and the last hints of their values."""
 
+import functools
 import re
 
 import numpy as np
@@ -705,6 +706,11 @@ def of_frames_a_step_apart(T_WA, T_WB):
     return np.eye(4) if np.allclose(T_WA, T_WB) else np.linalg.inv(T_WA) @ T_WB
 
 
+def without_links_that_hardly_move(transforms):
+    moving = [T for T in transforms if not np.allclose(T, np.eye(4), atol=1e-2)]
+    return functools.reduce(np.matmul, moving, np.eye(4))
+
+
 def none_where_hardly_any(T):
     angle = np.linalg.norm(Rotation.from_matrix(T[:3, :3]).as_rotvec())
     return (0.0, 0.0) if np.allclose(T, np.eye(4), atol=1e-3) else (angle, np.linalg.norm(T[:3, 3]))
@@ -777,6 +783,7 @@ def of_several(distances, scale):
         ("invert", by_first_order),
         ("relative", of_frames_turned_apart),
         ("relative", of_frames_a_step_apart),
+        ("chain", without_links_that_hardly_move),
         ("closure_error", none_where_hardly_any),
         ("kuka_from_matrix", pole_from_a_thousandth),
         ("closure_error", without_small_angles),

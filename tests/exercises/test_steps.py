@@ -159,6 +159,13 @@ def test_the_line_and_the_slip_are_told(right, wrong, said):
             """,
             "in line 3, `if a[0] < 0:`: what stands under this condition should never happen.",
         ),
+        (
+            """
+            D = np.diag(a) - np.eye(3)
+            return len(b) * np.linalg.norm(b - (b @ a) / (a @ a) * a) + np.trace(D) - a.sum() + 1
+            """,
+            "in line 2, `np.eye(3)`: its entry 0 (counted from 0, along the last axis) has the wrong sign.",
+        ),
     ],
 )
 def test_what_is_blamed_is_what_a_student_can_change(body, said):

@@ -1331,6 +1331,21 @@ CHAPTER = Chapter(
                     "A quotient loses the quadrant: A = np.arctan2(r10, r00).",
                     id="kuka-quotient-A",
                 ),
+                *(
+                    Mistake(
+                        _undone(
+                            lambda R, k=k, inverse=inverse: inverse(
+                                np.clip(R[k, 0] / np.hypot(R[0, 0], R[1, 0]), -1, 1)
+                            )
+                        ),
+                        f"Your A {bound}, as an {name} is: take np.arctan2(r10, r00), which knows the quadrant. All that follows from A is wrong with it.",
+                        id=f"kuka-{name}-A",
+                    )
+                    for k, inverse, name, bound in (
+                        (0, np.arccos, "arccosine", "is never negative"),
+                        (1, np.arcsin, "arcsine", "is never beyond 90 deg"),
+                    )
+                ),
                 Mistake(
                     _undone(lambda R: _right_A(R) + np.pi, _B_along),
                     "The pose is right, but A is half a turn away, so that B leaves the range from -90 to 90 deg.",

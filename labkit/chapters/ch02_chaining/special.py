@@ -56,6 +56,7 @@ CHAINS = (
             ("turns without a shift", dict(reach=0.0)),
             ("turns by very little", dict(angle=1e-3)),
             ("turns by some hundred-thousandths of a degree", dict(angle=6e-7)),
+            ("turns by some thousandths of a degree and hardly shifts", dict(angle=4e-5, reach=4e-5)),
             ("is shorter than a hundredth of a millimeter", dict(reach=5e-3)),
             ("is many meters long", dict(reach=5e4)),
             ("is half a turn", dict(angle=HALF)),
