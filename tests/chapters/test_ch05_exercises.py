@@ -244,6 +244,19 @@ def test_rows_whose_other_entry_is_the_misprint_are_told():
     assert told[0] == "3 misprints are not named yet"
 
 
+def test_a_step_by_numeric_derivatives_about_other_axes_is_right():
+    def step(T_FS, T_BF, x_S, target):
+        def residuals(u):
+            T = frames.pose(exp_so3(u[:3]) @ T_FS[:3, :3], T_FS[:3, 3] + u[3:])
+            return (frames.transform(T_BF @ T, x_S) - target).ravel()
+
+        J = exercises.numeric_jacobian(residuals, np.zeros(6), 1e-5, "central")
+        u = -np.linalg.lstsq(J, residuals(np.zeros(6)), rcond=None)[0]
+        return frames.pose(exp_so3(u[:3]) @ T_FS[:3, :3], T_FS[:3, 3] + u[3:])
+
+    assert all(judged("gauss_newton_on_pose", step, seed).status == CORRECT for seed in range(2))
+
+
 def test_all_poses_that_look_up_are_counted():
     T_FS = np.eye(4)
     down = np.tile(frames.pose(np.diag([1.0, -1, -1]), np.zeros(3)), (31, 1, 1))

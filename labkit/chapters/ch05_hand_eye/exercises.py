@@ -1238,7 +1238,7 @@ CHAPTER = Chapter(
             fixed={"T_FS": POSE, "target": POINT},
             metric=metrics.Poses(1e-6, 1e-6),
             noisy=(
-                (uphill, metrics.Poses(1e-6, 1e-6), "right, but not from a start so far off that the residuals grow with the step. Gauss-Newton takes it whole all the same:"),
+                (uphill, metrics.Poses(1e-5, 1e-5), "right, but not from a start so far off that the residuals grow with the step. Gauss-Newton takes it whole all the same:"),
                 (functools.partial(pose_off, turn=1e-6, shift=1e-4), metrics.Poses(1e-6, 1e-6), "right, but not from a start that is off by less than 0.001 mm and a millionth of a rad:"),
                 (few_poses, metrics.Poses(1e-4, 1e-4), "right, but not of three poses:"),
                 (one_far_off, metrics.Poses(1e-6, 1e-6), "right, but not where one sphere center is far off. Gauss-Newton's step hears it like all others:"),
