@@ -20,6 +20,7 @@ import numpy as np
 from . import guard, mutation
 
 NOTE, TICK = "_labkit_note_", "_labkit_tick_"
+LONGEST = 1e5  # up to which a number may grow to its exponential: it may end a range
 ROUNDS = 16  # values of one place that are kept: it may stand in a loop
 ENTRIES = 5000  # of an array that is kept
 LENGTH = 60  # characters of code that are quoted
@@ -404,6 +405,13 @@ def _otherwise(plan, args, note):
     return lambda value, turn: _like(value, change(_number(value), np.asarray(args[plan[3]], dtype=float)))
 
 
+def _exponential(v):
+    """Not of a number so large that an array as long as its exponential would fill the memory."""
+    if np.ndim(v) == 0 and v > np.log(LONGEST):
+        raise ValueError("too long")
+    return np.exp(v)
+
+
 def _given_otherwise(args, i, change):
     return (*args[:i], _like(args[i], OTHERWISE[change][1](_number(args[i]))), *args[i + 1 :])
 
@@ -585,7 +593,7 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
     ("it belongs there wrapped to between -pi and pi", lambda v: np.angle(np.exp(1j * v))),
     ("what is below 0 is to be 0 there", lambda v: np.maximum(v, 0.0)),
     ("its logarithm belongs there", np.log),
-    ("its exponential belongs there", np.exp),
+    ("its exponential belongs there", lambda v: _exponential(v)),
     ("its sine belongs there", np.sin),
     ("its tangent belongs there", np.tan),
     ("its diagonal alone belongs there", lambda v: np.diag(np.diag(_square(v)))),

@@ -693,6 +693,13 @@ def far_apart(rng):
     return rng.normal(size=3), rng.normal(size=3) + [0.0, 3.0, 0.0]
 
 
+def test_no_end_of_a_range_is_changed_for_its_exponential():
+    changed = dict(rerun.OTHERWISE)["its exponential belongs there"]
+    assert changed(np.array(2.0)) == np.exp(2.0) and np.all(np.isfinite(changed(np.array([18.0, 19.0]))))
+    with pytest.raises(ValueError, match="too long"):
+        changed(np.array(18.0))
+
+
 def test_of_steps_of_its_own_none_is_told_to_be_the_first_that_disagrees(monkeypatch):
     text = "def formula(a, b):\n    x = a * b\n    y = a + x\n    return x * y + np.exp(b)\n"
     body = (
