@@ -52,6 +52,11 @@ def test_many_short_steps_are_an_arc():
     assert ITEMS["step_arc"].judge(short_steps, rng=np.random.default_rng(0)).status == CORRECT
 
 
+def test_positions_are_drawn_with_either_coordinate_the_larger():
+    reference = ITEMS["lateration_residual"].reference
+    texts("lateration_residual", lambda landmarks, distances, p: reference(landmarks, distances, np.sort(p)))
+
+
 @pytest.mark.parametrize("name", ["step_euler", "step_midpoint", "step_arc", "jacobian_state"])
 def test_a_robot_that_cannot_reverse_is_told_so(name):
     reference = ITEMS[name].reference

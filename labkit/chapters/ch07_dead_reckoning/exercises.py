@@ -35,9 +35,9 @@ def two_circles(rng, left=True, up=True, with_origin=True, angle=None):
 
 
 def several_circles(rng, n):
-    """So many landmarks, distances that do not fit exactly, and a position."""
+    """So many landmarks, distances that do not fit exactly, and a position, of which x is larger than y if n is odd."""
     landmarks = rng.uniform(-5, 5, (n, 2))
-    position = rng.uniform(-5, 5, 2)
+    position = np.sort(rng.uniform(-5, 5, 2))[:: -1 if n % 2 else 1].copy()
     off = rng.uniform(0.05, 0.2, len(landmarks)) * (-1) ** np.arange(len(landmarks))
     return landmarks, np.linalg.norm(landmarks - position, axis=1) * (1 + off), position
 
