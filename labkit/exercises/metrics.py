@@ -194,6 +194,8 @@ def _refuse_infinite(array):
 
 def _describe(result):
     name = type(result).__name__
+    if isinstance(result, np.ndarray) and result.dtype.kind in "USO":
+        return "an array of text" if result.dtype.kind != "O" else "an array of objects that are no numbers"
     return f"{'an' if name[0] in 'aeiouAEIOU' or name == 'ndarray' else 'a'} {name}"
 
 

@@ -14,6 +14,7 @@ from .metrics import Angles, Exactly, Numbers, Poses, Rotations, Several, Throug
 
 CLOSE = 1e4  # tolerances: an answer nearer than this is right in kind, but not accurate enough ...
 FAR = 1e-2  # ... unless it is off by more than this: a coarse tolerance leaves no room for less accurate answers
+SHEARED = 1e-3  # from which on RᵀR differs from I by more than rounding
 SIMPLE = 12  # the largest number in a fraction that is worth telling
 NEARLY = 1e-3  # how nearly a result made by differences, say, must be a multiple of the right one
 EXACT = 1e-9  # how nearly two numbers have to agree for it
@@ -136,12 +137,34 @@ def _pose_in_parts(metric, results, expected):
 
 def _rotation_kind(matrices, what):
     """What keeps matrices from being rotations, if anything does."""
-    sheared = max(np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max(initial=0.0) for r in matrices)
-    if sheared > 1e-3:
-        return f"your {what} is not orthonormal: RᵀR differs from I by {sheared:.2g}"
-    if any((np.linalg.det(r) < 0).any() for r in matrices):
-        return f"your {what} is a reflection, its determinant is -1: one axis points the wrong way, or all three do"
+    off = [np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).reshape(-1, 3, 3).max(axis=0, initial=0.0) for r in matrices]
+    sheared = [o.max() > SHEARED for o in off]
+    if any(sheared):
+        return f"your {what} is not orthonormal{_on_some(sheared)}: {_sheared_words(np.max(off, axis=0))}"
+    mirrored = [(np.linalg.det(r) < 0).any() for r in matrices]
+    if any(mirrored):
+        cause = "does an axis point the wrong way, have two changed places?"
+        return f"your {what} is a reflection{_on_some(mirrored)}, its determinant is -1: {cause}"
     return None
+
+
+def _listed(names):
+    return " and ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
+
+
+def _on_some(true):
+    return "" if all(true) else " on some draws"
+
+
+def _sheared_words(off):
+    """What is not as in a rotation, of how far the products of its columns are from those of a rotation."""
+    lengths = [name for name, amount in zip("xyz", np.diag(off)) if amount > SHEARED]
+    askew = [f"{'xyz'[i]} and {'xyz'[j]}" for i, j in ((0, 1), (0, 2), (1, 2)) if off[i, j] > SHEARED]
+    if not askew:
+        return f"the length of its column{'s' * (len(lengths) > 1)} {_listed(lengths)} is not 1"
+    if not lengths and len(askew) < 3:
+        return f"its columns {', and '.join(askew)} are not perpendicular"
+    return f"RᵀR differs from I by {off.max():.2g}"
 
 
 def _rotation_relation(results, holds, whole):
@@ -168,8 +191,7 @@ def turned_axes(metric, pairs):
     for signs in itertools.product((1, -1), repeat=3):
         if all(metric.equal(_with_axes(metric, result, signs), expected) for result, expected in pairs):
             names = [axis for axis, sign in zip("xyz", signs) if sign < 0]
-            told = " and ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
-            return f"your {told} {'point' if names[1:] else 'points'} the other way"
+            return f"your {_listed(names)} {'point' if names[1:] else 'points'} the other way"
     return None
 
 

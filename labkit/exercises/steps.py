@@ -419,7 +419,8 @@ class Search:
         """These places in their order, but what is taken apart at once, as `x` in `x[2]`, behind all others."""
         places = self.written.places
 
-        apart = {first for _, text, _, _, first in places if text.startswith(f"{places[first][1]}[")}
+        whole = (text.split(" = ", 1)[-1].startswith(f"{places[first][1]}[") for _, text, _, _, first in places)
+        apart = {place[-1] for place, taken in zip(places, whole) if taken}
         return sorted(among, key=lambda k: (k in apart, k))
 
     def _is_asked_for(self, function):
@@ -718,7 +719,8 @@ class Search:
                     any(values[i][0] > 1 for values in v) for i, v in ((k, self.values), (q, solution.values))
                 )
                 each = (self._in_which_round(k) if theirs else ", a part of it in each round") if mine else ""
-                return f"{self._where(k)}, stands the right result{each}, but something else is returned"
+                others = " on some draws" if any(case.was_right for case in self.cases) else ""
+                return f"{self._where(k)}, stands the right result{each}, but something else is returned{others}"
         return None
 
     def _is_operand(self, k):

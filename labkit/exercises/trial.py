@@ -95,7 +95,8 @@ class Trial(Raised, Staying):
         step = step or search and (search.passed_words(solution) or search.notebook_words(solution) or search.words())
         step = step or search and search.passed_words(solution, True)
         shape = self._other_shape() if self.refusal else ""
-        words = words or (not self.refusal and step) or (not shape and not step and (unmoved or self._one_change()))
+        step = step or (None if words or shape else unmoved or self._one_change())
+        words = words or (not self.refusal and step)
         if words:
             return self.outcome(NOT_YET, closed(words) + self._about_globals())
         if search and not step and not self._right_often():

@@ -71,6 +71,11 @@ def test_unrelated_numbers_have_no_relation(expected):
     assert words(lambda e: rng.normal(size=e.shape), expected) is None
 
 
+def _askew(R):
+    y = R[:, 1] + 0.5 * R[:, 0]
+    return np.column_stack([R[:, 0], y / np.linalg.norm(y), R[:, 2]])
+
+
 @pytest.mark.parametrize(
     "change, told",
     [
@@ -78,7 +83,10 @@ def test_unrelated_numbers_have_no_relation(expected):
         (lambda R: np.swapaxes(R, -1, -2), "transpose"),
         (lambda R: 1.1 * R, "not orthonormal"),
         (lambda R: R * (1, 1, -1), "reflection"),
-        (np.negative, "one axis points the wrong way, or all three do"),
+        (np.negative, "does an axis point the wrong way, have two changed places?"),
+        (lambda R: R * (1, 1, 2), "not orthonormal: the length of its column z is not 1"),
+        (lambda R: 2 * R, "the length of its columns x, y and z is not 1"),
+        (_askew, "not orthonormal: its columns x and y are not perpendicular"),
     ],
 )
 def test_relations_of_rotations(change, told):
@@ -93,6 +101,11 @@ def test_axes_that_point_the_other_way_are_named(metric, poses):
     assert relations.turned_axes(metric, [(T * signs, T) for T in right]) == "your y and z point the other way"
     assert relations.turned_axes(metric, [(T * signs, T) for T in right[:2]] + [(right[2], right[2])]) is None
     assert relations.turned_axes(metrics.Numbers(), [(-right[0], right[0])]) is None
+
+
+def test_what_is_a_reflection_on_some_draws_is_said_of_these():
+    pairs = [(R * (1, 1, 1 if k else -1), R) for k, R in enumerate(TURNS)]
+    assert "is a reflection on some draws, its determinant" in relations.difference_words(metrics.Rotations(), pairs)
 
 
 def test_a_pose_that_is_wrong_in_one_part_says_by_how_much():
