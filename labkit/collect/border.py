@@ -108,9 +108,10 @@ class Border:
             self.read[function] = rerun.written(self.ours[function])
         written, began = self.read[function], time.thread_time()
         if what == "read":
-            found = written and (written.changes, written.places)
+            facts = {name: getattr(written, name, None) for name in rerun.Written.READ}
+            found = written and (written.changes, written.places, facts)
         elif what == "trace":
-            found = written.trace(args, seconds)
+            found = written.trace(args, seconds), written.of_truth
         elif what == "truths":
             found = written.truths(args, seconds)
         else:
@@ -171,7 +172,7 @@ class Remote:
         found, _ = self.rerun("read", otherwise=None)
         try:
             return found and Written(self, *found)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, KeyError, AttributeError):
             return None
 
     def rerun(self, what, args=(), plans=(), seconds=guard.TIME_LIMIT, otherwise=()):
@@ -239,14 +240,20 @@ class Remote:
 class Written:
     """`rerun.Written` of a function on the other side."""
 
-    def __init__(self, remote, changes, places):
-        self.remote = remote
+    def __init__(self, remote, changes, places, facts):
+        self.remote, self.of_truth = remote, set()
         self.changes = [(int(rank), int(line), str(code), str(mends)) for rank, line, code, mends in changes]
         self.places = [(int(n), str(code), str(name), int(size), int(k)) for n, code, name, size, k in places]
+        self.lines = {int(n): str(line) for n, line in facts["lines"].items()}
+        self.of_notebook, self.repeats = set(map(str, facts["of_notebook"])), bool(facts["repeats"])
+        self.iterated, self.searched, self.walked = (
+            set(map(int, facts[n])) for n in ("iterated", "searched", "walked")
+        )
 
     def trace(self, args, seconds):
         """As `rerun.Written.trace`."""
-        found, _ = self.remote.rerun("trace", args, seconds=seconds)
+        (found, of_truth), _ = self.remote.rerun("trace", args, seconds=seconds, otherwise=((), ()))
+        self.of_truth |= set(map(int, of_truth))
         return [_rounds(*pair) for pair in found] if len(found) == len(self.places) else [(0, None)] * len(self.places)
 
     def truths(self, draws, seconds):

@@ -17,7 +17,7 @@ import warnings
 
 import numpy as np
 
-from . import guard, mutation
+from . import guard, mutation, scope
 
 NOTE, TICK = "_labkit_note_", "_labkit_tick_"
 LONGEST = 1e5  # up to which a number may grow to its exponential: it may end a range
@@ -169,6 +169,8 @@ class Written:
     of_truth: numbers of the places where a truth value, or an array of them, was met in a trace.
     """
 
+    READ = ("lines", "of_notebook", "iterated", "searched", "walked", "repeats")  # what is known without a trace
+
     def __init__(self, function, tree, lines=None, beside=()):
         self.function, self.beside, self.lines = function, [helper for helper, _ in beside], lines or {}
         self.trees = [tree, *(definition for _, definition in beside)]
@@ -176,6 +178,11 @@ class Written:
         self._noted, self.places = _noted(function, self.trees, self.lines)
         for tree in self.trees:
             _ticking(tree)
+
+    @functools.cached_property
+    def of_notebook(self):
+        """Names of the notebook's data that the function reads without being given them."""
+        return set(scope.notebook_data(self.function))
 
     @functools.cached_property
     def iterated(self):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import metrics, mutation, operands, relations, rerun, scope, slips
+from . import metrics, mutation, operands, relations, rerun, slips
 from .arguments import is_numeric
 
 WORTH = 3  # how unlikely a change of the code may be that is tried before changes of values
@@ -178,7 +178,7 @@ class Search:
         self.values = _traces(written, self.cases, budget)
         self.exactly = all(isinstance(c.metric, metrics.Exactly) for c in self.cases)
         self.chosen = self.exactly and all(type(c.expected) is int for c in self.cases)
-        self.turns = any(map(ANGLES.search, [written.function.__doc__ or "", *written.lines.values()]))
+        self.turns = any(map(ANGLES.search, written.lines.values()))
 
     @_or_nothing
     def finer_words(self):
@@ -585,12 +585,12 @@ class Search:
 
     def _of_notebook(self):
         """Places where data of the notebook are read, or taken in by something larger."""
-        read = set(scope.notebook_data(self.written.function))
+        read = self.written.of_notebook
         return {k for k, (_, code, *_) in enumerate(self.written.places) if read & set(NAMES.findall(code))}
 
     def _left_out_words(self):
         """That a part of the code which reads the notebook's data is too many, where all is right without it."""
-        read, changes = set(scope.notebook_data(self.written.function)), self.written.changes
+        read, changes = self.written.of_notebook, self.written.changes
         parts = (k for k, (*_, mends) in enumerate(changes) if TOO_MANY in mends)
         plan = self.mending([("code", k) for k in parts if read & set(NAMES.findall(changes[k][2]))])
         return plan and "in line {1}, `{2}`: {3}. {told}".format(*changes[plan[1]], told=ALONE)

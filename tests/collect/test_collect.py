@@ -208,6 +208,16 @@ def test_a_prediction_an_unfinished_exercise_and_a_missing_cell_are_told_apart()
     assert result["items"]["flat"] == {"status": "predicted", "choice": "a height twice as large", "right": True}
 
 
+def test_a_step_that_is_wrong_is_told_by_its_line_as_in_the_notebook():
+    """What is known of a function's code and of its values on the way crosses the border."""
+    wrong = "@ex.relative\ndef relative(A, B):\n    back = np.linalg.inv(A)\n    onward = B.T\n    return back @ onward"
+    masked = "@ex.normalize\ndef normalize(v):\n    v = np.asarray(v)\n    return v / np.sqrt(v[v > 0] @ v[v > 0])"
+    cells = replaced(replaced(solved_cells(), "relative", wrong), "normalize", masked)
+    items = batch.judged(notebook_text(cells).encode(), 1)["items"]
+    assert "n line 4, `B.T`: one transpose is too many." in items["relative"]["text"]
+    assert "n line 4, `np.sqrt(v[v > 0] @ v[v > 0])`" in items["normalize"]["text"]
+
+
 def test_a_stage_computes_for_a_value_but_not_while_an_answer_is_judged():
     head = "from labkit.chapters.ch01_frames import stages\nstate = dict(A_deg=10.0, B_deg=20.0, C_deg=30.0)\n"
     value = f"{head}T = stages.compute_kuka_gimbal(state)['T']\nassert ex.after('invert') and T.shape == (4, 4)\n"
