@@ -78,9 +78,10 @@ FINER = -1  # the rank of what is made finer: few changes, tried by themselves, 
 TINY, LONGER = 1e-6, 1000  # up to which a step of differences may be too short, and how many times as long is not
 ADDED = 0.01  # up to which a number that is added may be there to keep a divisor from 0
 ITERATION = 20  # rounds of a loop that goes on until nothing changes, and not through what is given
-ROUNDS = 200  # of a loop, or ten times as many as it has: enough for what converges
+ROUNDS = 400  # of a loop, or ten times as many as it has: enough for what converges
 STACKS = {"column_stack", "hstack", "vstack", "stack", "concatenate"}
 STACKED = "the part"  # how what is wrong begins where one part less is put together
+SHARES = {"isclose", "allclose"}
 SIZES = (
     "len({})",
     "len({}) - 1",
@@ -213,6 +214,22 @@ def _sizes(function):
         if isinstance(node, ast.Attribute) and node.attr == "size":
             new = ast.Call(ast.Name("len", ast.Load()), [node.value], [])
             yield Change("", f"it counts all numbers, and `{ast.unparse(new)}` belongs there", 1, node, put(new))
+
+
+def _of_no_share(function):
+    """Comparisons that allow a share of the numbers as well, `isclose` and `allclose`, all of them without it."""
+    group = []
+    for node, put in _parts(function):
+        if isinstance(node, ast.Call) and _called(node) in SHARES and len(node.args) == 2:
+            share = "rel_tol" if ast.unparse(node.func).startswith("math.") else "rtol"
+            rest = [keyword for keyword in node.keywords if keyword.arg != share]
+            new = ast.Call(node.func, node.args, [*rest, ast.keyword(share, ast.Constant(0))])
+            mends = f"`{_called(node)}` allows a share of the numbers besides: `{share}=0` belongs there"
+            group.append(Change("", mends, 0, node, put(new)))
+    if len(group) == 1:
+        yield group[0]
+    elif sets := _together(group):
+        yield Change("", f"{group[0].mends}, and into its other calls", 0, group[0].place, sets)
 
 
 def _of_diagonals(function):
@@ -362,8 +379,8 @@ def _indices(function):
 def mending(function):
     """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer,
     gone on with or begun at 0, an axis, an outer product, an index that a loop should count, an argument or a size that
-    is typed in, a pi of three digits, the sign that a root has lost, a diagonal that is meant or is not, and one slip
-    mended wherever it stands: who copies a line copies its slip.
+    is typed in, a pi of three digits, the sign that a root has lost, a diagonal that is meant or is not, a share that a
+    comparison allows, and one slip mended wherever it stands: who copies a line copies its slip.
     """
     found = changes(function)
     narrower = list(_narrower(function, found))
@@ -387,6 +404,7 @@ def mending(function):
     found += _lost_signs(function)
     found += _of_diagonals(function)
     found += _sizes(function)
+    found += _of_no_share(function)
     meant = {*_digits_left(function), *_not_repeated(function), *_typed_starts(function)}
     return sorted((change for change in found if change.place not in meant), key=lambda change: change.rank)
 

@@ -404,6 +404,15 @@ def first_gain_twice(x0, var0, z, stds):
     return x + k * (z[1] - x), (1 - k) * (1 - k) * var0
 
 
+def twenty_rounds(A, C, cov_v, cov_z):
+    P = np.eye(len(A))
+    for _ in range(20):
+        M = A @ P @ A.T + cov_v
+        K = M @ C.T @ np.linalg.inv(C @ M @ C.T + cov_z)
+        P = M - K @ C @ M
+    return K
+
+
 def rows_repeated(x0, cov0, z, C, cov_z):
     rows, W, L0 = np.repeat(C, len(z), axis=0), np.kron(np.eye(len(z)), np.linalg.inv(cov_z)), np.linalg.inv(cov0)
     P = np.linalg.inv(L0 + rows.T @ W @ rows)
@@ -456,6 +465,9 @@ def in_degrees_and_half_of_what_is_large(x0, cov0, z, C, cov_z):
         ("fuse_two_sensors", first_gain_twice, "The second sensor gets the gain of the first"),
         ("batch_estimate", rows_repeated, "np.tile"),
         ("gate", two_slips, "Two slips"),
+        ("gate", lambda y, S, limit: bool((y**2 < limit * np.diag(S)).all()), "Each number is judged by itself"),
+        ("wrap_angle", lambda a: np.fmod(a + np.pi, 2 * np.pi) - np.pi, "An angle below -pi ends below -pi"),
+        ("steady_state_gain", twenty_rounds, "these are too few rounds: 400 will do"),
         ("predict_state", scaled_by_the_control, "`U = np.diag(u)`: the identity belongs on the right side"),
         (
             "fuse_two_sensors",

@@ -50,6 +50,7 @@ def status(printed, value, bound, misprint, simulated):
     [
         ("off <= half + bound else", "off <= bound else", "not with the bound alone"),
         ("off <= half:", "np.isclose(value, x, atol=half):", "right"),
+        ("off <= half + bound", "np.isclose(value, x, rtol=1e-3, atol=half + bound)", "and into its other calls"),
         ("half_unit(printed)", "half_unit(str(x))", "43.00 has two decimals"),
         ('return "misprint" if', 'return "rounding" if bound else "misprint" if', "needs no treatment of its own"),
     ],
@@ -92,6 +93,10 @@ def suspects(entries, average):
 """
 
 
+TRIED = "t = texts.copy()\n            t[k] = other\n            if fits(t):\n                found.add(k)"
+MEAN_AND_AVERAGE = "abs(x[:-1].mean() - x[-1]) <= h[:-1].mean() + h[-1] + 1e-12"
+
+
 def test_the_frame_of_these_answers_is_right():
     for text, id in ((SUSPECTS, "suspects"), (STATUS, "status")):
         with pytest.raises(AssertionError, match=CORRECT):
@@ -106,6 +111,8 @@ def test_the_frame_of_these_answers_is_right():
         ("return abs(x[:-1].mean() - x[-1])", "return x[:-1].mean() - x[-1]", "take its absolute value"),
         ("x[:-1].mean() - x[-1]", "np.median(x[:-1]) - x[-1]", "compare with the median"),
         ("    return found", "    return found if len(found) == 1 else set()", "several could have slipped"),
+        (TRIED, TRIED.replace("texts.copy()", "texts") + "; break", "take a fresh copy for each"),
+        (MEAN_AND_AVERAGE, "round(x[:-1].mean(), 2) == round(x[-1], 2)", "the same decimals in every"),
     ],
 )  # fmt: skip
 def test_a_search_for_slips_that_is_wrong_in_one_respect(right, wrong, told):
@@ -399,6 +406,10 @@ def half_unit(printed):
     number, _, exponent = repr(float(printed.replace(",", "."))).partition("e")
     return 0.5 * 10.0 ** (int(exponent or 0) - len(number.partition(".")[2].rstrip("0")))
 """
+LETTERS_OF_THE_FLOAT = """
+def half_unit(printed):
+    return 0.5 / 10 ** len(str(float(printed.replace(",", "."))).split(".")[1])
+"""
 OF_THE_FLOAT = "def half_unit(printed):\n    return 0.5 * np.spacing(float(printed.replace(',', '.')))"
 ONE_SHARE = "def left_out(r, J):\n    return r / (1 - max(np.diag(J @ np.linalg.pinv(J))))"
 JOSEPH = """def with_one_more(C, J):
@@ -433,6 +444,7 @@ def motions(F, S):
     [
         (ledger, "bound", UP, "moves of one direction"),
         (ledger, "half_unit", THROUGH_FLOAT, "float() forgets"),
+        (ledger, "half_unit", LETTERS_OF_THE_FLOAT, "float() forgets"),
         (ledger, "half_unit", OF_THE_FLOAT, "too small on every draw"),
         (own, "left_out", ONE_SHARE, "the largest share for all"),
         (own, "with_one_more", SHRINKING, "(I - K J) C"),

@@ -1137,7 +1137,7 @@ SOLVED = asked(np.linalg.solve, two_equations)
         ),
         (
             "x = np.zeros(2)\nfor _ in range(5):\n    x = x - 0.02 * a.T @ (a @ x - b)\nreturn x",
-            "`range(5)`: with 200 rounds the result comes nearer on every draw",
+            "`range(5)`: with 400 rounds the result comes nearer on every draw",
         ),
     ],
 )

@@ -1693,7 +1693,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a: np.fmod(a + np.pi, 2 * np.pi) - np.pi,
-                    "Negative angles end below -pi: np.fmod, np.trunc and int() cut off toward zero. The operator `%` does not.",
+                    "An angle below -pi ends below -pi: np.fmod, np.trunc and int() cut off toward zero. The operator `%` does not.",
                     id="wrap_angle-97beb8",
                 ),
                 Mistake(
@@ -1786,15 +1786,18 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda x, l: measurement(x, l) * [1, 0] + [0, np.arctan2(*(l - x[:2])[::-1]) - x[2]],
-                    "Distance and bearing are right, but the bearing lies outside [-pi, pi): wrap it.",
+                    "Distance and bearing are right, but the bearing can lie outside [-pi, pi): wrap it.",
+                    id="measurement-3b3222",
                 ),
                 Mistake(
                     lambda x, l: np.array([measurement(x, l)[0], wrapped(np.arctan2(*(x[:2] - l)[::-1]) - x[2])]),
-                    "Your bearing points backward: from the robot to the landmark, not from the landmark to the robot.",
+                    "Your bearing is the opposite one, as from the landmark to the robot. It is to lead from the robot to the landmark, by dx, dy = landmark - x[:2].",
+                    id="measurement-aa4934",
                 ),
                 Mistake(
                     lambda x, l: np.array([measurement(x, l)[0], np.arctan2(*(x[:2] - l)[::-1]) - x[2]]),
-                    "Your bearing points backward: from the robot to the landmark, not from the landmark to the robot.",
+                    "Your bearing is the opposite one, as from the landmark to the robot. It is to lead from the robot to the landmark, by dx, dy = landmark - x[:2].",
+                    id="measurement-aa4934-2",
                 ),
                 Mistake(
                     lambda x, l: np.array([measurement(x, l)[0], wrapped(np.arctan2(*(l - x[:2])) - x[2])]),
@@ -2509,7 +2512,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _gated(lambda y, S: np.sqrt(y @ np.linalg.solve(S, y))),
-                    "Too much passes: the limit belongs to y' S^-1 y itself, no root taken, and stays what is given.",
+                    "The limit belongs to y' S^-1 y itself: no root is taken of it, and the limit stays what is given.",
+                    id="gate-c1dc0d",
                 ),
                 Mistake(
                     _gated(lambda y, S: (y**2 / np.diag(S)).sum()),
@@ -2517,15 +2521,18 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda y, S, g: bool((y**2 <= g * np.diag(S)).all()),
-                    "You left the correlation out: use the whole inverse of S, not only its diagonal.",
+                    "Each number is judged by itself here, and the correlation is left out. Judge them together: y' S^-1 y, with the whole inverse of S.",
+                    id="gate-de1e7e-2",
                 ),
                 Mistake(
                     lambda y, S, g: bool((np.abs(y) <= 3 * np.sqrt(np.diag(S))).all()),
-                    "You left the correlation out: use the whole inverse of S, not only its diagonal.",
+                    "Each number is judged by itself here, and the correlation is left out. Judge them together: y' S^-1 y, with the whole inverse of S.",
+                    id="gate-de1e7e-3",
                 ),
                 Mistake(
                     lambda y, S, g: bool((np.abs(y) <= 2 * np.sqrt(np.diag(S))).all()),
-                    "You left the correlation out: use the whole inverse of S, not only its diagonal.",
+                    "Each number is judged by itself here, and the correlation is left out. Judge them together: y' S^-1 y, with the whole inverse of S.",
+                    id="gate-de1e7e-4",
                 ),
                 Mistake(_gated(lambda y, S: y @ S @ y), "You multiplied by S. In the middle stands its inverse."),
                 Mistake(
@@ -2534,7 +2541,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _gated(lambda y, S: (y @ np.linalg.solve(S, y)) ** 2),
-                    "Too little passes: y' S^-1 y is the square already, and the limit belongs to it as it is.",
+                    "y' S^-1 y is the square already, and the limit belongs to it as it is.",
+                    id="gate-e5ee0a",
                 ),
                 *(
                     Mistake(
@@ -2546,8 +2554,14 @@ CHAPTER = Chapter(
                         (2.0, "belongs to the square as it is, which is not squared again."),
                     )
                 ),
-                Mistake(lambda y, S, g: True, "You let everything pass: what is the limit for?"),
-                Mistake(lambda y, S, g: False, "You refuse everything: such a filter never corrects itself."),
+                Mistake(
+                    lambda y, S, g: True, "On all draws everything passed: what is the limit for?", id="gate-9e5d6f"
+                ),
+                Mistake(
+                    lambda y, S, g: False,
+                    "On all draws nothing passed: such a filter never corrects itself.",
+                    id="gate-afdfe3",
+                ),
             ],
         ),
         Exercise(

@@ -183,6 +183,11 @@ def _as_float_prints_it(printed):
     return _digits_left(_without_zeros)(repr(_number(printed)))
 
 
+def _letters_of_the_float(printed):
+    """The same, all letters behind the point counted, an exponent's among them; where there is no point it fails."""
+    return 0.5 * 10.0 ** -len(repr(_number(printed)).split(".")[1])
+
+
 def _of_the_value(printed):
     return 0.005 * abs(_number(printed))
 
@@ -652,7 +657,7 @@ CHAPTER = Chapter(
                         variant,
                         "float() forgets how many digits were printed: 1.010000 has six decimals, 12 has none. Work on the string.",
                     )
-                    for variant in (_through_float, _as_float_prints_it)
+                    for variant in (_through_float, _as_float_prints_it, _letters_of_the_float)
                 ),
                 Mistake(
                     _digits_left(_without_zeros),

@@ -288,8 +288,8 @@ BOUND = Exercise(
         ),
         Mistake(
             lambda f, p: np.abs(np.subtract(*_moves(f, p))).sum() / 2,
-            "Up and down f moves by different amounts, and this is their mean, half of the way from down to up. The "
-            "larger of the two counts.",
+            "This is half of the way from down to up. What counts is how far f moves from its value, up and down: the "
+            "larger of the two moves.",
             id="bound-fd3da6",
         ),
         Mistake(
@@ -331,10 +331,11 @@ BOUND = Exercise(
         *(
             Mistake(
                 _by_derivative(step),
-                "That is the slope times the half unit. Where f is curved the move itself is larger: go the half "
+                "That is the slope times the half unit. Where f is curved the move itself is another: go the half "
                 "unit up and down.",
+                id=f"bound-1fcd90{which}",
             )
-            for step in (1e-6, 1e-5, 1e-4, 1e-7, 1e-8)
+            for step, which in ((1e-6, ""), (1e-5, "-2"), (1e-4, "-3"), (1e-7, "-4"), (1e-8, "-5"))
         ),
         Mistake(
             _relative_moves,
@@ -658,8 +659,8 @@ def _alike_changed(entries, average):
     return {k for k, trial in changed if _agree(trial[:-1], trial[-1])}
 
 
-def _slips_pile_up(entries, average):
-    """Every slip is tried on a column in which the slips before it still stand."""
+def _slips_pile_up(entries, average, stops=False):
+    """Every slip is tried on a column in which the slips before it still stand; stops: once one explains the gap."""
     printed, found = [*entries, average], set()
     if _agree(entries, average):
         return found
@@ -668,6 +669,8 @@ def _slips_pile_up(entries, average):
             printed[k] = other
             if _agree(printed[:-1], printed[-1]):
                 found.add(k)
+                if stops:
+                    break
     return found
 
 
@@ -724,6 +727,13 @@ def _all_over_one_more(entries, average):
 
 def _close_agrees(entries, average):
     return bool(np.isclose(sum(map(number, entries)) / len(entries), number(average)))
+
+
+def _rounded_agrees(decimals):
+    """Entries and average agree where their digits do, after rounding to so many decimals."""
+    return lambda entries, average: (
+        round(sum(map(number, entries)) / len(entries), decimals) == round(number(average), decimals)
+    )
 
 
 def _first_alike(k, other, entries):
@@ -937,6 +947,14 @@ SUSPECTS = Exercise(
             "np.isclose allows a small share of the number, whatever was printed. Allow what the half units of entries "
             "and average hide.",
         ),
+        *(
+            Mistake(
+                _search(agree=_rounded_agrees(decimals)),
+                "You round to the same decimals in every column, however many are printed. Allow what the half units "
+                "of entries and average hide.",
+            )
+            for decimals in (2, 1, 3)
+        ),
         Mistake(
             _search(give=_first_alike),
             "Of entries that are printed alike you name the first alone, as `index` finds it. Count the positions: "
@@ -1010,9 +1028,12 @@ SUSPECTS = Exercise(
             _alike_changed,
             "You put a slip wherever its number is printed. Two may be printed alike: change one position alone.",
         ),
-        Mistake(
-            _slips_pile_up,
-            "The slips you have tried stay in the column: take a fresh copy for each.",
+        *(
+            Mistake(
+                functools.partial(_slips_pile_up, stops=stops),
+                "The slips you have tried stay in the column: take a fresh copy for each.",
+            )
+            for stops in (False, True)
         ),
         Mistake(
             _first_half_as_printed,
