@@ -42,6 +42,8 @@ class Exercise(Item):
     decimals:   {argument: reason} of arguments that nobody has to take in whole numbers.
     draws:      how many draws a check takes; 0 where the properties alone judge.
     limit:      seconds that one call may take.
+    about:      function(result, *arguments) -> what is true of a wrong result that nothing else explains, in a sentence
+                without numbers, told where all draws are wrong and have the same; None where there is nothing.
     """
 
     reference: object
@@ -55,6 +57,7 @@ class Exercise(Item):
     decimals: dict = field(default_factory=dict)
     draws: int = 5
     limit: float = guard.TIME_LIMIT
+    about: object = None
 
     def __post_init__(self):
         super().__post_init__()

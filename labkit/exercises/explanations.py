@@ -258,6 +258,19 @@ class Explanations(Named):
             return ""
         return " Your function draws random numbers, so part of this may be chance: is there a way without them?"
 
+    def _about(self):
+        """What the exercise tells of results that are wrong on every draw, as one more sentence."""
+        if self.exercise.about is None or self.refusal or self._right_somewhere():
+            return ""
+        wrong = [(pair[0], args) for args, metric, pair in self._cases() if not metric.equal(*pair)]
+        try:
+            with np.errstate(all="ignore"), guard.only_finite_matrices():
+                told = {self.exercise.about(result, *copy.deepcopy(args)) for result, args in wrong}
+        except Exception:  # not every result can be asked
+            return ""
+        words = told.pop() if len(told) == 1 else None
+        return f" {words}" if words else ""
+
     def _makes_no_difference(self, k, draws, least=0):
         """Whether the k-th argument, taken from the next draw, changes the reference's results, never the student's."""
         tried = 0

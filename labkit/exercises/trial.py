@@ -115,6 +115,6 @@ class Trial(Raised, Staying):
                     return self.outcome(NOT_YET, self._of_some(closed(f"{words} {off}")) + self._about_globals())
         words = unmoved or self._never_said() or self._relation() or self._picked()
         said, example, call = (closed(words) if words else self._deviation()).partition(NOT_RIGHT)
-        said += self._where_it_is_wrong() if words else self._constant() + self._by_chance()
+        said += (self._where_it_is_wrong() if words else self._constant() + self._by_chance()) + self._about()
         words = said + self._agreement(search, solution) + example + call
         return self.outcome(NOT_YET, words + self._about_globals())

@@ -396,6 +396,11 @@ def four_points_at_least(points_F, points_W):
     return library_fit(points_F, points_W) if len(points_F) > 3 else np.eye(4)
 
 
+def through_other_three_points(points_F, points_W):
+    k = [2, 0, 1]
+    return frames.frame_from_points(*points_W[k]) @ frames.invert(frames.frame_from_points(*points_F[k]))
+
+
 def last_turn_only(xyzabc):
     R = Rotation.from_euler("x", 3 * xyzabc[5]).as_matrix()
     return np.block([[R, np.reshape(xyzabc[:3], (3, 1))], [0, 0, 0, 1]])
@@ -413,6 +418,7 @@ def last_turn_only(xyzabc):
         ("kuka_from_matrix", pole_by_r00, ""),
         ("kuka_from_matrix", pole_from_87_deg, "but not a degree or two beside one"),
         ("gram_schmidt", one_sign_of_qr, "your y and z point the other way where the result is wrong"),
+        ("fit_frame", through_other_three_points, "Another pose brings the points nearer"),
     ],
 )
 def test_frames_that_are_right_for_some_only(name, answer, told, seed):
@@ -463,6 +469,27 @@ def to_the_corrected_pose(transforms):
 def tip_then_point(A, b):
     tip = lstsq(A[:, :3], b, rcond=None)[0]
     return np.append(tip, lstsq(A[:, 3:], b - A[:, :3] @ tip, rcond=None)[0])
+
+
+def in_pairs(transforms):
+    row = list(transforms)
+    while len(row) > 1:
+        row = [A @ B for A, B in zip(row[::2], row[1::2])]
+    return np.array(row[0])
+
+
+def each_at_its_end(transforms):
+    links = np.array(transforms)
+    for _ in range(5):
+        links = links @ exp_se3(-log_se3(chaining.chain(links)) / len(links))
+    return links
+
+
+def turned_by_the_skew_part(T):
+    S = T[:3, :3] - T[:3, :3].T
+    X = exp_se3([S[2, 1] / 2, S[0, 2] / 2, S[1, 0] / 2, 0.0, 0.0, 0.0])
+    X[:3, 3] = T[:3, 3]
+    return X
 
 
 library_distribute = chaining.distribute_closure
@@ -532,6 +559,9 @@ def before_the_first_comment(text):
         ("distribute_closure", to_the_corrected_pose, "the share of their end"),
         ("distribute_closure", a_link_as_it_was, ""),
         ("chain", long_links_alone, ""),
+        ("chain", in_pairs, "where `transforms` has 3, 6 or 9 rows, and not where it has 2 or 4"),
+        ("distribute_closure", each_at_its_end, "The loop of your links does not close"),
+        ("orthonormalize", turned_by_the_skew_part, "Your block is a rotation, but another one is nearer"),
         ("closure_error", slide, "slides along the axis"),
         ("read_system", no_exponents, "line 1"),
         ("read_system", comments_and_empty_lines_at_the_margin, ""),

@@ -138,9 +138,21 @@ def test_what_the_first_of_some_draws_alone_is(draws, told):
     assert words == (told and f"exactly where {told}")
 
 
-def test_a_size_that_is_typed_in_is_told_before_odd_and_even():
-    draws = [({"J": np.ones((9, n))}, 0.5) for n in 8 * [2, 3, 4]]
-    assert cases.case_words(draws, 8 * [True, False, True]) == "exactly where `J` does not have 3 columns"
+def test_a_size_that_is_typed_in_is_told_before_those_that_came():
+    draws = [({"J": np.ones((n, n))}, 0.5) for n in 8 * [2, 3, 5, 4]]
+    assert cases.case_words(draws, 8 * [True, False, True, True]) == "exactly where `J` does not have 3 rows"
+
+
+@pytest.mark.parametrize(
+    "wrong, told",
+    [
+        ((3, 6, 9), "exactly where `x` has 3, 6 or 9 entries, and not where it has 2 or 4"),
+        ((4,), None),  # whatever else is special about this draw
+    ],
+)
+def test_sizes_are_told_as_they_came_and_no_rule_is_made_of_them(wrong, told):
+    draws = [({"x": np.ones(n)}, 0.5) for n in 8 * [3, 2, 9, 4, 6]]
+    assert cases.case_words(draws, [len(given["x"]) in wrong for given, _ in draws]) == told
 
 
 def test_what_only_a_few_others_have_is_told_too():

@@ -420,6 +420,18 @@ def _pole_from(limit_deg):
     return variant
 
 
+def _as_at_one_pole(sign):
+    """At both poles A is set to 0 and C read from r01 as it is right at one of them."""
+
+    def variant(T):
+        xyzabc = frames.kuka_from_matrix(T)
+        if np.hypot(T[0, 0], T[1, 0]) < 1e-9:
+            xyzabc[3], xyzabc[5] = 0, np.arctan2(sign * T[0, 1], T[1, 1])
+        return xyzabc
+
+    return variant
+
+
 def at_the_pole(sign):
     """A draw at B = +-90 deg, with the rounding noise that a product of two matrices leaves."""
 
@@ -505,6 +517,19 @@ def _kabsch(handed=True, turned=lambda R: R, shift=lambda R, p, q: q.mean(0) - R
         return T
 
     return variant
+
+
+def _does_not_lie_best(T_WF, points_F, points_W):
+    """Whether a pose puts the points farther from where they were measured than the best one does, in words."""
+    gaps = (
+        np.sum((frames.transform(T, points_F) - points_W) ** 2) for T in (T_WF, frames.fit_frame(points_F, points_W))
+    )
+    own, least = gaps
+    return (
+        "Another pose brings the points nearer to where they were measured: it has a smaller sum of squared distances."
+        if own > (1 + 1e-9) * least
+        else None
+    )
 
 
 def _rotation_of_the_transpose(U, V):
@@ -1321,6 +1346,15 @@ CHAPTER = Chapter(
                     )
                     for limit_deg in (85, 89.5, 89.96)
                 ),
+                *(
+                    Mistake(
+                        _as_at_one_pole(sign),
+                        f"With A at 0, your C has the wrong sign at B = {-90 * sign} deg: r01 is sin C at B = 90 deg and -sin C at -90 deg. "
+                        "r12 is -sin C at both.",
+                        id=f"kuka-as-at-{90 * sign:g}",
+                    )
+                    for sign in (1, -1)
+                ),
                 Mistake(
                     _undone(lambda R: np.arctan(R[1, 0] / R[0, 0]), _B_along),
                     "The pose is right, but B leaves the range from -90 to 90 deg: the quotient r10/r00 loses the quadrant of A. Use np.arctan2(r10, r00).",
@@ -1435,6 +1469,7 @@ CHAPTER = Chapter(
             draw=(drawn_points, functools.partial(drawn_points, flat=True)),
             metric=metrics.Poses(1e-6, 1e-6),
             properties=(right_where(frames.fit_frame, metrics.Poses(1e-6, 1e-6), *special.SETS),),
+            about=_does_not_lie_best,
             noisy=(
                 functools.partial(drawn_points, count=3),
                 metrics.Poses(1e-6, 1e-6),
@@ -1469,6 +1504,12 @@ CHAPTER = Chapter(
                     _kabsch(handed=lambda U, V: np.diag([1, 1, np.linalg.det(V @ U.T)]) @ V @ U.T),
                     "You turned the last row of V Uᵀ. Where it is a mirror image, the last column of V changes its sign, before Uᵀ is multiplied.",
                     id="fit_frame-last-row",
+                ),
+                Mistake(
+                    _kabsch(handed=lambda U, V: V @ U.T @ np.diag([1, 1, np.linalg.det(V @ U.T)])),
+                    "Where V Uᵀ is a mirror image, this is V Uᵀ with its own last column turned around. It is the last column of V that "
+                    "changes its sign, before Uᵀ is multiplied.",
+                    id="fit_frame-last-column",
                 ),
                 Mistake(
                     _kabsch(handed=lambda U, V: V @ U.T * np.sign(np.linalg.det(V @ U.T))),

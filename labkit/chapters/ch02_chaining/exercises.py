@@ -214,6 +214,29 @@ READINGS_OF_B = {  # by the row, by the column, by the sine alone
 }
 
 
+def _through_quaternion(T):
+    """The rotation of the quaternion that trace and skew part of a rotation would have."""
+    R = T[:3, :3]
+    vector = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    return _with_rotation(T, frames.matrix_from_quaternion([*vector, 1 + np.trace(R)]))
+
+
+def _not_the_nearest(X, T):
+    """Whether the block of X is a rotation, but a nearer one is that of the reference, in words."""
+    R, own = T[:3, :3], X[:3, :3]
+    off, least = (np.linalg.norm(block - R) for block in (own, nearest_rotation(R)))
+    if np.abs(own.T @ own - np.eye(3)).max() > 1e-6 or np.linalg.det(own) < 0 or off <= (1 + 1e-9) * least:
+        return None
+    return "Your block is a rotation, but another one is nearer to that of T: the squares of its differences have a smaller sum."
+
+
+def _whether_it_closes(links, transforms):
+    """Whether the corrected links lead back to their start, in words."""
+    if np.allclose(chaining.chain(links), np.eye(4), atol=1e-5):
+        return "The loop of your links closes, but not with the poses exp(-k/N xi) P_k on the way."
+    return "The loop of your links does not close: their product is not I."
+
+
 def _one_step(T):
     """One step of Newton's iteration, the mean of R and its inverse transposed."""
     return _with_rotation(T, (T[:3, :3] + np.linalg.inv(T[:3, :3]).T) / 2)
@@ -444,7 +467,7 @@ CHAPTER = Chapter(
         Exercise(
             "chain",
             reference=chain,
-            draw=tuple(functools.partial(random_links, count=n) for n in (3, 2, 9, 4)),
+            draw=tuple(functools.partial(random_links, count=n) for n in (3, 2, 9, 4, 6)),
             metric=metrics.Poses(1e-6, 1e-6),
             noisy=(
                 functools.partial(random_links, count=1),
@@ -959,6 +982,7 @@ CHAPTER = Chapter(
                 for defects in ((1e-6, 3e-6), (1e-4, 2e-4))
             ],
             properties=(right_where(chaining.orthonormalize, metrics.Poses(1e-6, 1e-6), *special.BLOCKS),),
+            about=_not_the_nearest,
             hints=(
                 "Which rotation lies nearest to a matrix that is almost one? The translation stays.",
                 "With R = U S Vᵀ, the nearest rotation is U Vᵀ: the SVD with its singular values set to 1.",
@@ -1063,6 +1087,12 @@ CHAPTER = Chapter(
                     "nothing changes, or take the SVD.",
                     id="orthonormalize-one-step",
                 ),
+                Mistake(
+                    _through_quaternion,
+                    "This is what comes of a quaternion read from the trace and R - Rᵀ, and set to length 1: a rotation, but another one is "
+                    "nearest to R. Take the SVD.",
+                    id="orthonormalize-quaternion",
+                ),
                 *(
                     Mistake(
                         _through_angles(B),
@@ -1096,6 +1126,7 @@ CHAPTER = Chapter(
                 )
             ],
             properties=(right_where(chaining.distribute_closure, metrics.Poses(1e-5, 1e-5), *special.LOOPS),),
+            about=_whether_it_closes,
             hints=(
                 "The product is exp(xi). Going back by all of xi at the end closes the loop; how far back should the pose after link k go? "
                 "P_k, the pose after k links, becomes exp(-k/N xi) P_k.",
