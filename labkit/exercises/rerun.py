@@ -268,7 +268,7 @@ class Written:
                     return (note.seen,)
                 note = _Note(self.counted, plan[1])
                 note.watched = plan[3] if plan[0] == "own" else None
-                note.otherwise = _otherwise(plan, copies, note)
+                note.otherwise = _but_for_copies(_otherwise(plan, copies, note))
                 return (self._made(self._noted, {NOTE: note})(*copies),)
         except (Exception, TooLong):  # a change may well make nonsense of a function
             return None
@@ -410,6 +410,18 @@ def _otherwise(plan, args, note):
     if plan[0] == "own":
         return lambda value, turn: _like(value, change(_number(value), _number(note.seen)))
     return lambda value, turn: _like(value, change(_number(value), np.asarray(args[plan[3]], dtype=float)))
+
+
+def _but_for_copies(change):
+    """The same, where another value comes of it; else the very array: a copy of it would mend what is filled later on,
+    and have nothing to do with what the change is said to be.
+    """
+
+    def changed(value, turn):
+        new, old = change(value, turn), numeric(value)
+        return value if old is not None and np.array_equal(_number(new), old, equal_nan=True) else new
+
+    return changed
 
 
 def _exponential(v):

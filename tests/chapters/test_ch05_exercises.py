@@ -427,6 +427,17 @@ def as_square(function, x, step):
     return rows if len(rows) == len(function(x)) else rows.T
 
 
+def in_one_array(function, x, step):
+    here, columns = x.copy(), []
+    for k in range(len(x)):
+        here[k] = x[k] + step
+        ahead = function(here)
+        here[k] = x[k] - step
+        columns.append((ahead - function(here)) / (2 * step))
+        here[k] = x[k]
+    return np.column_stack(columns)
+
+
 def weights(scale=lambda s: s, change=lambda w, lengths: w):
     def answer(residuals):
         lengths = np.linalg.norm(residuals, axis=1)
@@ -475,6 +486,7 @@ FORGETFUL = [
     ("kuka_residual", but_for("kuka_residual", lambda p2, T_BF, *_: (np.arange(len(T_BF)) < 50)[:, None])),
     ("kuka_residual", lambda *given: (e := RIGHT["kuka_residual"](*given)) * (abs(e) > 1e-3)),
     ("numeric_jacobian", as_square),
+    ("numeric_jacobian", in_one_array),
     ("numeric_jacobian", lambda f, x, step: RIGHT["numeric_jacobian"](f, x, max(step, 1e-3))),
     ("numeric_jacobian", lambda f, x, step: RIGHT["numeric_jacobian"](f, x, min(step, 0.1))),
     ("numeric_jacobian", but_for("numeric_jacobian", lambda f, x, step: np.arange(len(x)) < 5)),

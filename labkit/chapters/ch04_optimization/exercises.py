@@ -4,6 +4,7 @@ import functools
 import math
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ...documents.thesis import wells
 from ...estimation import convexity
@@ -655,10 +656,23 @@ def _slope_there(x):
         return "There f is nearly flat, far out on the plain, where the gradient fades and vanishes nowhere: start between the wells"
     if bends.min() > 0 and slope < NEXT_TO * bends.min():
         return "There the gradient vanishes, or nearly so, and f bends up in all directions: that is a minimum"
-    return f"There the gradient is {slope:.3g} long. At a saddle it vanishes"
+    near = np.linalg.norm(x - wells.extrema()[2].x) < WITHIN_REACH
+    further = ", and one is near: a few of Newton's steps from there end in it" if near else ""
+    return f"There the gradient is {slope:.3g} long. At a saddle it vanishes{further}"
+
+
+def _equal_depths():
+    """The place on the line between the centers where both wells contribute alike to f."""
+    near, far = wells.CENTERS
+    share = brentq(lambda t: np.diff(wells.DEPTHS / _terms((1 - t) * near + t * far)[1])[0], 0, 1)
+    return (1 - share) * near + share * far
 
 
 FLAT, NEXT_TO = 1.0, 1e-2  # curvature that is next to nothing; how far off a minimum may be that is told as such
+WITHIN_REACH = 0.05  # of the saddle, from where Newton's steps end in it
+NOT_DOWNHILL = (
+    "A search downhill ends in a well; Newton's step ends in the saddle, from a start near the pass between the wells."
+)
 
 
 CHAPTER = Chapter(
@@ -1278,11 +1292,11 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: wells.extrema()[0].x,
-                    "That is the local minimum: start nearer to the pass between the wells.",
+                    f"That is the local minimum. {NOT_DOWNHILL}",
                 ),
                 Mistake(
                     lambda: wells.extrema()[1].x,
-                    "That is the global minimum: start nearer to the pass between the wells.",
+                    f"That is the global minimum. {NOT_DOWNHILL}",
                 ),
                 Mistake(
                     lambda: (wells.extrema()[0].x + wells.extrema()[1].x) / 2,
@@ -1291,13 +1305,23 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.array([-0.9948, -1.9922]),
-                    "That is the global minimum, as the thesis prints it: start nearer to the pass between the wells.",
+                    f"That is the global minimum, as the thesis prints it. {NOT_DOWNHILL}",
                     id="saddle-printed-global",
                 ),
                 Mistake(
                     lambda: np.array([0.9789, 0.9684]),
-                    "That is the local minimum, as the thesis prints it: start nearer to the pass between the wells.",
+                    f"That is the local minimum, as the thesis prints it. {NOT_DOWNHILL}",
                     id="saddle-printed-local",
+                ),
+                Mistake(
+                    lambda: wells.CENTERS.sum(0) - wells.extrema()[2].x,
+                    "This is as far from (−1, −2) as the saddle is from (1, 1): on the line t runs from (1, 1) to (−1, −2).",
+                    id="saddle-from-the-other-end",
+                ),
+                Mistake(
+                    _equal_depths,
+                    "There both wells contribute alike to f. At the saddle it is their slopes that cancel: the gradient vanishes.",
+                    id="saddle-equal-depths",
                 ),
             ],
         ),
@@ -1722,7 +1746,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: (cost - new_cost) / _predicted(g, np.diag(np.diag(B)), step),
-                    "Only the diagonal of B is used, as by `B * step * step` or a sum of squares: the term is ½ hᵀB h, `step @ B @ step`.",
+                    "Only the diagonal of B is used, as by `np.diag(B) @ step**2`: the term is ½ hᵀB h, `step @ B @ step`.",
                     id="gain-diagonal",
                 ),
                 Mistake(
@@ -1951,6 +1975,11 @@ CHAPTER = Chapter(
                 (draw, ITERATE, words)
                 for draw, words in (
                     (beyond.no_rounds, "right, but not of no rounds at all:"),
+                    (
+                        beyond.residuals_that_are_x,
+                        "right, but not where `residual` returns the very x that it is given (is that x changed before the "
+                        "residuals are used?):",
+                    ),
                     *beyond.AT_THE_LIMITS,
                 )
             ]

@@ -170,6 +170,11 @@ def smooth_function(rng, m=None, n=None, step=(0.03, 0.08), size=1.0, away=0.0):
     return (lambda x: size * (np.sin(M @ x) + c * (x @ x))), x, float(rng.uniform(*step))
 
 
+def returning_a_view(rng):
+    """A function that turns its variables around, in the very array that it is given: where that changes, they do."""
+    return (lambda x: x[::-1]), rng.normal(size=4), float(rng.uniform(0.03, 0.08))
+
+
 SPECIAL_FUNCTIONS = (  # what is special, tolerance, least size it is relative to, words
     ({"m": 3, "n": 3}, 1e-9, 1.0, "right, but not of as many values as variables:"),
     ({"m": 2, "n": 8}, 1e-9, 1.0, "right, but not of eight variables:"),
@@ -177,6 +182,12 @@ SPECIAL_FUNCTIONS = (  # what is special, tolerance, least size it is relative t
     ({"step": (1, 3)}, 1e-9, 1.0, "right, but not with a step above 1:"),
     ({"away": 20.0}, 1e-9, 1.0, "right, but not far from 0:"),
     ({"size": 1e-7}, 1e-7, 0.0, "right, but not of a function that hardly changes, its derivatives below 1e-4:"),
+)
+
+
+VIEW = (
+    "right, but not of a function that returns a view of the array it is given, such as `x[::-1]` (is that array changed "
+    "before what came back is used?):"
 )
 
 
@@ -1142,7 +1153,8 @@ CHAPTER = Chapter(
             noisy=tuple(
                 (functools.partial(smooth_function, **special), metrics.Numbers(tol, least=least), words)
                 for special, tol, least, words in SPECIAL_FUNCTIONS
-            ),
+            )
+            + ((returning_a_view, metrics.Numbers(1e-9), VIEW),),
             hints=(
                 "Move one variable at a time, and look at the function ahead and behind.",
                 "Column k is (f(x + h e_k) - f(x - h e_k)) / (2 h), with e_k the k-th unit vector.",
@@ -1408,6 +1420,8 @@ CHAPTER = Chapter(
                 Mistake(lambda e: _tukey(np.linalg.norm(e, axis=1) / (5 * np.std(e))), "Your scale is the standard deviation of the entries: the outliers stretch it. Take the median length."),
                 Mistake(lambda e: _tukey(np.linalg.norm(e, axis=1) / (5 * np.median(np.abs(e)) / robust.MEDIAN_CHI3)),
                         "You took the median of all entries. Take the median of the lengths, one per pose."),
+                Mistake(lambda e: _tukey(np.linalg.norm(e, axis=1) / (5 * 1.4826 * np.median(np.abs(e)))),
+                        "Your scale is 1.4826 times the median of all entries. Take the median of the lengths, one per pose, and divide it by 1.538.", id="robust-weights-mad-of-entries"),
                 Mistake(_weights(lambda r: _tukey(r / 5 * np.median(r) / robust.MEDIAN_CHI3)), "`/ 5 * s` divides by 5 and multiplies by s: write / (5 * s)."),
                 Mistake(_weights(lambda r: _tukey((r / (5 * np.median(r) / robust.MEDIAN_CHI3)) ** 2)), "u itself is squared in the formula, yours is squared twice."),
                 Mistake(_weights(lambda r: (1 - (r / (5 * np.median(r) / robust.MEDIAN_CHI3)) ** 2) ** 2),
