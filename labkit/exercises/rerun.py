@@ -239,7 +239,8 @@ class Written:
         A plan is ("code", number of a change), ("value", number of a place, number of one of `OTHERWISE`, number of an
         argument), ("own", number of a place, number of one of `OTHERWISE`, number of the place where a variable was
         bound before), ("argument", number of an argument, number of one of `OTHERWISE`), ("given", number of a place,
-        values in its place, one for every round) or ("last", number of a place), which gives the last of its values.
+        values in its place, one for every round), ("copy", number of a place), which puts a copy of its value there, or
+        ("last", number of a place), which gives the last of its values.
         Where one fails, `keep` gets None. The list is shorter where the time, in seconds, is over.
         """
         found = []
@@ -268,7 +269,7 @@ class Written:
                     return (note.seen,)
                 note = _Note(self.counted, plan[1])
                 note.watched = plan[3] if plan[0] == "own" else None
-                note.otherwise = _but_for_copies(_otherwise(plan, copies, note))
+                note.otherwise = _copied if plan[0] == "copy" else _but_for_copies(_otherwise(plan, copies, note))
                 return (self._made(self._noted, {NOTE: note})(*copies),)
         except (Exception, TooLong):  # a change may well make nonsense of a function
             return None
@@ -410,6 +411,10 @@ def _otherwise(plan, args, note):
     if plan[0] == "own":
         return lambda value, turn: _like(value, change(_number(value), _number(note.seen)))
     return lambda value, turn: _like(value, change(_number(value), np.asarray(args[plan[3]], dtype=float)))
+
+
+def _copied(value, _):
+    return copy.deepcopy(value)
 
 
 def _but_for_copies(change):

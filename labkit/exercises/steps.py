@@ -57,6 +57,8 @@ TURNED, OTHER_SIGN = "has the wrong sign", "the sign is the other one"
 UNEQUAL = ("where `==` belongs", "where `!=` belongs")  # what computed numbers are never, or always
 TRUTHS = {"`0` belongs": "`False` belongs", "`1` belongs": "`True` belongs"}
 NOT_NEEDED = "What you make of it there does not belong in the result"
+FILLED = re.compile(r"\w+(\[.*?\] *[-+*/@%|&]*| *[-+*/@%|&]+)=[^=]")  # a[k] = ..., a += ...
+HANDED_ON = re.compile(r"(\w+ = )?[\w.]+(\[[\w:, -]*\])*$")  # an array or a part of it, as it is
 ALONE = "With this alone changed, your result is right"
 
 
@@ -329,7 +331,8 @@ class Search:
         """Those that are the result itself come first: a slow function leaves no time for all the others."""
         places = range(len(self.written.places))
         ends = {k for k in places if self._ends(k)}
-        words = self._turned_words(self._with_own(ends)) or self._turned_words(self._turned(ends))
+        words = self._copied_words()
+        words = words or self._turned_words(self._with_own(ends)) or self._turned_words(self._turned(ends))
         others = set(places) - ends
         words = words or self._turned_words(self._turned(others)) or self._turned_words(self._with_own(others))
         return words or self._argument_words()
@@ -338,6 +341,17 @@ class Search:
         """Whether a value is the result on all draws on which that place is reached, the first among them."""
         reached = [(v[k][1][-1], r) for v, r in zip(self.values, self.results) if v[k][0]]
         return bool(self.values[0][k][0]) and all(r is not None and _same(value, r) for value, r in reached)
+
+    def _copied_words(self):
+        """That of an array which a line fills or adds to a copy is to be handed on: else that line changes what was."""
+        drawn, places = range(len(self.values)), self.written.places
+        arrays = [k for k in range(len(places)) if any(np.ndim(self.values[i][k][1]) > 1 for i in drawn)]
+        if not any(FILLED.match(places[k][1]) for k in arrays):
+            return None
+        plan = self.mending([("copy", k) for k in arrays if HANDED_ON.match(places[k][1])])
+        return (
+            plan and f"{self._where(plan[1])}: a copy belongs there, as the array itself is changed later on. {ALONE}"
+        )
 
     def _turned_words(self, plans):
         plan = self.mending(list(plans))

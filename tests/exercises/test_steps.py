@@ -650,6 +650,17 @@ def test_a_copy_that_is_none_and_too_few_digits_are_told(body, said):
     assert said in judged(asked(lambda a, b: a * (a + 1.0), two_numbers), body)
 
 
+@pytest.mark.parametrize("fill", ["total += b[k] * a", "total[:] = total + b[k] * a"])
+def test_an_array_that_is_kept_and_then_filled_on_is_told_to_be_copied(fill):
+    """Its value is right where it is kept: any other in its place would mend for being another array."""
+    item = asked(lambda a, b: np.cumsum(np.outer(b, a), axis=0), two_vectors)
+    body = (
+        f"kept, total = [], np.zeros(3)\nfor k in range(3):\n    {fill}\n    kept.append(total)\nreturn np.array(kept)"
+    )
+    text = "in line 5, `total`: a copy belongs there, as the array itself is changed later on. With this alone"
+    assert judged(item, body).startswith(text)
+
+
 def test_an_array_of_whole_numbers_alone_is_told():
     body = "x = np.array([n for n in (a, b)])\nx[0] = x[0] + 0.5\nreturn x[0] * x[1]"
     item = asked(lambda a, b: (a + 0.5) * b, lambda rng: (int(rng.integers(1, 9)), int(rng.integers(1, 9))))
