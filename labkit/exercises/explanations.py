@@ -306,7 +306,7 @@ class Explanations(Named):
             words = f"{axes} where the result is wrong"
         told = closed(words or str(self._worst([shown[1:]]) if example else most))
         if len(missed) == len(pairs):
-            side = cases.side_words(pairs)
+            side = cases.side_words(pairs) and cases.side_words([pair for *_, pair in self._fresh_results])
             told = f"{told[:-1]}, and {side}." if side else told
             return told + self._right_parts() + example
         special = self._special_case()

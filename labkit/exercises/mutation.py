@@ -232,6 +232,20 @@ def _of_no_share(function):
         yield Change("", f"{group[0].mends}, and into its other calls", 0, group[0].place, sets)
 
 
+def _repeated(function):
+    """Lists and tuples that a whole number is to multiply, made arrays: else they are repeated so many times."""
+    for node, put in _parts(function):
+        if not isinstance(node, ast.BinOp) or not isinstance(node.op, ast.Mult):
+            continue
+        for value, times in ((node.left, node.right), (node.right, node.left)):
+            if isinstance(value, ast.Name | ast.Subscript) and type(getattr(times, "value", None)) is int:
+                product = f"np.array({ast.unparse(value)}) * {times.value}"
+                listed = f"isinstance({ast.unparse(value)}, (list, tuple))"
+                new = ast.parse(f"{product} if {listed} else {ast.unparse(node)}", mode="eval").body
+                mends = f"this repeats a list or tuple, and `{product}` belongs there"
+                yield Change("", mends, 0, node, put(new))
+
+
 def _of_diagonals(function):
     """Sums of rows or columns where the diagonal is meant, and a matrix with all but its diagonal set to 0."""
     for node, put in _parts(function):
@@ -380,7 +394,8 @@ def mending(function):
     """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer,
     gone on with or begun at 0, an axis, an outer product, an index that a loop should count, an argument or a size that
     is typed in, a pi of three digits, the sign that a root has lost, a diagonal that is meant or is not, a share that a
-    comparison allows, and one slip mended wherever it stands: who copies a line copies its slip.
+    comparison allows, a list that is repeated, and one slip mended wherever it stands: who copies a line copies its
+    slip.
     """
     found = changes(function)
     narrower = list(_narrower(function, found))
@@ -405,6 +420,7 @@ def mending(function):
     found += _of_diagonals(function)
     found += _sizes(function)
     found += _of_no_share(function)
+    found += _repeated(function)
     meant = {*_digits_left(function), *_not_repeated(function), *_typed_starts(function)}
     return sorted((change for change in found if change.place not in meant), key=lambda change: change.rank)
 

@@ -577,6 +577,11 @@ OF_ARRAYS = {  # what the same changes are called where they are made to an arra
     NOUGHT: "it does not belong there, but zeros of its shape in its place",
     ONE: "it does not belong there, but ones of its shape in its place",
 }
+CONSTANTS = {  # what an argument is replaced with wherever it is read: (a number, an array)
+    NOUGHT: ("0", "zeros"),
+    ONE: ("1", "ones"),
+    IDENTITY: ("1", "the identity"),
+}
 OF_TRUTHS = {  # what the same changes are called where they are made to a truth value, or an array of them
     OPPOSITE: "its opposite belongs there, `not` or `~`",
     NOUGHT: "it does not belong there, but False in its place",

@@ -359,15 +359,19 @@ class Search:
             return None
         kind, k, change, other = plan
         if rerun.OTHERWISE[change][0] == rerun.NOUGHT and self._is_given(k):
-            nought = "zeros" if any(values[k][1].ndim > 1 for values in self.values) else "0"
+            nought = "zeros" if self._is_array(k) else "0"
             there = "on the right side" if self._binds(k) else "in its place"
             return f"{self._where(k)}: with {nought} {there}, your result is right. {NOT_NEEDED}"
         name = "" if other is None else self._bound(other) if kind == "own" else self._given_name(k, other)
         words = rerun.OTHERWISE[change][0].format(name)
         words = rerun.OF_TRUTHS.get(words, words) if k in self.written.of_truth else words
-        words = rerun.OF_ARRAYS.get(words, words) if any(values[k][1].ndim > 1 for values in self.values) else words
+        words = rerun.OF_ARRAYS.get(words, words) if self._is_array(k) else words
         words = words.replace("belongs in its place", "belongs on the right side") if self._binds(k) else words
         return f"{self._where(k)}: {_closed(words)} {ALONE}"
+
+    def _is_array(self, k):
+        """Whether a place holds arrays: the values noted there come one below the other, a row for every round."""
+        return any(values[k][1].ndim > 1 for values in self.values)
 
     def _bound(self, k):
         """A variable by its name; `_`, which may be bound anew in every line, with its line."""
@@ -391,7 +395,14 @@ class Search:
                     if told and _changes(function, values[0], []):
                         plans.append(("argument", i, change))
         plan = self.mending(plans)
-        return plan and f"wherever you read `{self.names[plan[1]]}`: {_closed(rerun.OTHERWISE[plan[2]][0])} {ALONE}"
+        if plan is None:
+            return None
+        name, words = self.names[plan[1]], rerun.OTHERWISE[plan[2]][0]
+        if words in rerun.CONSTANTS:
+            constant = rerun.CONSTANTS[words][np.ndim(rerun.numeric(self.cases[0].args[plan[1]])) > 0]
+            same = f"the right one is the same whatever `{name}` is"
+            return f"with {constant} in the place of `{name}` wherever you read it, your result is right: {same}."
+        return f"wherever you read `{name}`: {_closed(words)} {ALONE}"
 
     def _where(self, k):
         line, code, name, *_ = self.written.places[k]

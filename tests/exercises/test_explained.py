@@ -423,6 +423,12 @@ def test_what_is_small_on_every_draw_is_said_to_be():
     assert "too small on every draw" in told(item, "return 1.0 + x * 0.3 * np.cos(std) ** 2")
 
 
+def test_what_is_small_on_the_few_draws_of_a_check_alone_is_not_said_to_be():
+    item = exercise(lambda x, std: float(np.exp(x) + std), lambda rng: (rng.uniform(1, 3), rng.uniform(1, 2)))
+    text = told(item, "return 1.0 + x * 0.3 * np.cos(std) ** 2 + 100 * (x > 2.7 and std > 1.5)")
+    assert text.startswith("it is off by ") and "on every draw" not in text
+
+
 def test_a_vector_and_a_number_that_are_both_wrong_are_compared_apart():
     two = metrics.Several(metrics.Numbers(), metrics.Numbers(), names=("place", "radius"))
     item = Exercise(

@@ -403,6 +403,19 @@ def test_what_is_to_be_done_with_an_argument_that_is_read_twice_is_told():
     assert said.startswith("wherever you read `a`: it is to be divided by its length.")
 
 
+def test_an_argument_of_which_the_right_result_is_independent_is_told():
+    """`u, v = 1` would raise: an array of ones is what mends it."""
+    item = replace(ITEM, reference=lambda a, b: b[0])
+    said = item.judge(typed("u, v, w = a\nreturn b[0] * (u + a[1] + w) / 3"), rng=np.random.default_rng(0)).text
+    assert said.startswith("with ones in the place of `a` wherever you read it, your result is right:")
+
+
+def test_a_list_that_is_repeated_is_told():
+    item = replace(ITEM, reference=lambda a, b: 10 * a)
+    said = item.judge(typed("c = list(a)\nreturn c * 10"), rng=np.random.default_rng(0)).text
+    assert "`c * 10`: this repeats a list or tuple, and `np.array(c) * 10` belongs there." in said
+
+
 def test_the_condition_that_was_met_where_it_is_wrong_is_told():
     body = """
     best = 0.0
