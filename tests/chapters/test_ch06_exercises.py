@@ -350,6 +350,10 @@ def test_a_turn_that_hardly_shows_makes_as_much_as_the_noise(turn):
     assert "about 0.014 mm, no more than the noise, not 0.802 mm" in text
 
 
+def test_a_turn_in_rad_is_known_without_its_digits():
+    assert ITEMS["knock"].judge(0.0022).text.startswith("This is in rad.")
+
+
 def distinct(M):
     s = np.unique(np.linalg.svd(M)[1].round(9))
     return s[1] / s[-1]

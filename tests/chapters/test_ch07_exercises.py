@@ -39,6 +39,15 @@ def test_where_an_arc_becomes_straight(straight_below, told):
     assert not told or all(told in text for text in found)
 
 
+def test_an_arc_that_only_keeps_the_divisor_from_0_stands_still_on_a_straight_line():
+    def guarded(x, u, dt):
+        h = u[1] * dt / 2
+        chord = u[0] * dt * np.sin(h) / (h + 1e-12)
+        return np.array([x[0] + chord * np.cos(x[2] + h), x[1] + chord * np.sin(x[2] + h), x[2] + 2 * h])
+
+    assert all(text.startswith("For omega = 0 your robot stays where it is.") for text in texts("step_arc", guarded))
+
+
 def test_wheels_that_rounding_alone_makes_unequal_turn_the_robot_that_fast():
     assert abs(odometry.wheel_to_twist(0.3, 0.1 + 0.2, 0.5)[1]) == pytest.approx(ch07.ROUNDED_WHEELS, rel=0.02)
 

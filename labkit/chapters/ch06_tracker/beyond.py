@@ -717,7 +717,7 @@ STATIONS = [
                 id="knock-degrees",
                 within=0.006,
             ),
-            Mistake(lambda: 1e-3 * _knock(), "This is in rad. Wanted are mrad.", id="knock-rad", within=1e-4),
+            Mistake(lambda: 1e-3 * _knock(), "This is in rad. Wanted are mrad.", id="knock-rad", within=3e-4),
             Mistake(
                 lambda: _knock("before the run"),
                 "This would be the station that moved before the run, which hardly shows. Let it move after stop 10.",

@@ -1292,6 +1292,11 @@ CHAPTER = Chapter(
                     for n in (2, 4, 5, 10, 20, 50, 100)
                 ),
                 *_slips(_chord, _half, "theta + h")[:-1],  # the sign in y has its own text above
+                Mistake(
+                    lambda x, u, dt: step_arc(x, u, dt) if u[1] else x + [0.0, 0.0, 0.0],
+                    "For omega = 0 your robot stays where it is. There it drives v T straight on: sin(h) / h is 1, and not 0, at h = 0.",
+                    id="step_arc-stands-still",
+                ),
             ],
         ),
         Prediction(
