@@ -63,6 +63,7 @@ def _candidates(data):
 def _of_number(name, value):
     for change, words in ALONE:
         yield change(value), words.format(name)
+    yield np.rad2deg(np.sin(value)), f"the sine of {name}, turned into degrees as an angle is"
     yield value**2, f"the square of {name}"
     yield np.sqrt(value), f"the root of {name}"
 

@@ -372,6 +372,13 @@ def pole_by_r00(T):
     return xyzabc
 
 
+def with_C_at_0_at_the_pole(T):
+    xyzabc, R = library_angles(T), T[:3, :3]
+    if np.hypot(R[0, 0], R[1, 0]) < 1e-9:
+        xyzabc[3], xyzabc[5] = np.arctan2(-R[0, 1] * np.sign(xyzabc[4]), R[1, 1]), 0
+    return xyzabc
+
+
 def pole_from_87_deg(T):
     R, sign = T[:3, :3], -np.sign(T[2, 0])
     if abs(R[2, 0]) > 0.999:
@@ -416,6 +423,7 @@ def last_turn_only(xyzabc):
         ("matrix_from_kuka", cosine_by_a_root, "cosine of B is never negative"),
         ("fit_frame", four_points_at_least, ""),
         ("kuka_from_matrix", pole_by_r00, ""),
+        ("kuka_from_matrix", with_C_at_0_at_the_pole, "At B = -90 deg your A + C has the wrong sign"),
         ("kuka_from_matrix", pole_from_87_deg, "but not a degree or two beside one"),
         ("gram_schmidt", one_sign_of_qr, "your y and z point the other way where the result is wrong"),
         ("fit_frame", through_other_three_points, "Another pose brings the points nearer"),

@@ -25,6 +25,7 @@ DATA = {"residuals": ROWS, "tip": TIP, "angle": 0.3, "gap": 7.0}
         (7.0 / np.tan(np.rad2deg(0.3)), None),
         (7.0 / np.rad2deg(0.3), "`gap` divided by `angle` in degrees"),
         (np.tan(0.3) * 7.0, "the tangent of `angle` times `gap`"),
+        (np.rad2deg(np.sin(0.3)), "this is the sine of `angle`, turned into degrees"),
         (0.3, "this is `angle`"),
         (123.456, None),
     ],

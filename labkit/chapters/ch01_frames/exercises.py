@@ -1349,8 +1349,8 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         _as_at_one_pole(sign),
-                        f"With A at 0, your C has the wrong sign at B = {-90 * sign} deg: r01 is sin C at B = 90 deg and -sin C at -90 deg. "
-                        "r12 is -sin C at both.",
+                        f"At B = {-90 * sign} deg your A {'+' if sign > 0 else '-'} C has the wrong sign: r01 is sin(C - A) at B = 90 deg and "
+                        "-sin(A + C) at -90 deg.",
                         id=f"kuka-as-at-{90 * sign:g}",
                     )
                     for sign in (1, -1)
@@ -1452,6 +1452,16 @@ CHAPTER = Chapter(
                     _angles(lambda abc: np.array([abc[0], abc[1], np.pi / 2 - abc[2]])),
                     "A and B are right. np.arctan2 takes y first, then x: the sine of C before its cosine.",
                     id="kuka-swapped-C-alone",
+                ),
+                Mistake(
+                    _angles(lambda abc: np.array([abc[0], abc[1], np.arcsin(np.sin(abc[2]))])),
+                    "A and B are right. Your C is never beyond 90 deg, as an arcsine is: take np.arctan2, which knows the quadrant.",
+                    id="kuka-arcsine-C",
+                ),
+                Mistake(
+                    _angles(lambda abc: np.array([abc[0], abc[1], np.arctan(np.tan(abc[2]))])),
+                    "A and B are right. Your C is that of a quotient, which loses the quadrant: C = np.arctan2(r21, r22) away from the pole.",
+                    id="kuka-quotient-C",
                 ),
             ],
         ),
