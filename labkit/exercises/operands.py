@@ -86,6 +86,8 @@ def _factor(results, expected, numeric, what="the expected one"):
         return None
     for words, sizes in _sizes(numeric):
         for power, form in POWERS.items():
+            if power < 1 and np.any(sizes < 0):
+                continue
             for sign, minus in ((1, ""), (-1, "minus ")):
                 if _same(ratios, sign * sizes**power):
                     return f"your result is {minus}{what} times {form.format(words)}"
@@ -99,11 +101,11 @@ def _same(ratios, sizes):
 
 
 def _sizes(numeric):
-    """Positive numbers that arguments have on each draw, with words: themselves, lengths, norms, sums, counts."""
+    """Numbers that arguments have on each draw, with words: themselves, lengths, norms, sums, counts."""
     for name, values in numeric.items():
         here = f"`{name}`"
         if all(v.ndim == 0 for v in values):
-            yield from _positive(here, np.abs(values))
+            yield from _signed(here, values)
         elif all(v.ndim for v in values):
             counts = np.array([len(v) for v in values], dtype=float)
             of = f"the {'number of entries' if values[0].ndim == 1 else 'number of rows'} of {here}"
@@ -116,10 +118,20 @@ def _sizes(numeric):
             yield from _positive(f"the largest of {here}", [v.max(initial=0.0) for v in values])
             if all(v.size == values[0].size <= 4 for v in values):
                 for k in range(values[0].size):
-                    yield from _positive(f"`{name}[{k}]`", [abs(v[k]) for v in values])
+                    yield from _signed(f"`{name}[{k}]`", [v[k] for v in values])
         if all(v.ndim == 2 for v in values):
             counts = np.array([v.shape[1] for v in values], dtype=float)
             yield from _positive(f"the number of columns of {here}", counts)
+
+
+def _signed(words, values):
+    """Numbers as they are, and without their signs where some are negative."""
+    values = np.asarray(values, dtype=float)
+    if np.all(values > 0):
+        yield from _positive(words, values)
+    elif np.all(np.isfinite(values)) and np.all(values):
+        yield words, values
+        yield from _positive(f"the absolute value of {words}", np.abs(values))
 
 
 def _positive(words, sizes):

@@ -37,6 +37,8 @@ EXPECTED = [3.0 * d["x"] + 1.0 for d in DRAWS]
         (lambda e, d: -e * d["dt"], "your result is minus the expected one times `dt`"),
         (lambda e, d: e * d["w"].sum(), "times the sum of `w`"),
         (lambda e, d: e / np.linalg.norm(d["w"]), "the length (norm) of `w` times your result"),
+        (lambda e, d: e * d["x"][0], "your result is the expected one times `x[0]`"),
+        (lambda e, d: e / abs(d["x"][0]), "the absolute value of `x[0]` times your result is the expected one"),
         (lambda e, d: e + 0.1 * d["x"] ** 2, None),
     ],
 )
