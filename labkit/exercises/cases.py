@@ -100,7 +100,7 @@ def side_words(results):
         return None
     off = np.array([result - expected for result, expected in results], dtype=float)
     side = "small" if (off < 0).all() else "large" if (off > 0).all() else None
-    return side and f"too {side} on every draw"
+    return side and f"too {side} on every draw of this check"
 
 
 def result_words(results):

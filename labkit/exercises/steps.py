@@ -809,8 +809,7 @@ class Search:
         line, code, *_ = self.written.places[units[len(known)]]
         if line in self.written.walked and not solution.repeats:
             return told
-        first = f"`{code}` in line {line} is the first behind that is not among them"
-        return f"{told}; {first}. Look from there on, unless you go another way than it does"
+        return f"{told}; `{code}` in line {line} is none of them, by a slip up to there or since you go another way"
 
     def _units(self, solution):
         """Places of the steps as a whole, in their order: variables that are bound, and what is part of no other."""

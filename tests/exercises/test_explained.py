@@ -422,7 +422,7 @@ def test_where_the_first_entries_are_right_it_is_told_on_which_draws_the_others_
 
 def test_what_is_small_on_every_draw_is_said_to_be():
     item = exercise(lambda x, std: float(np.exp(x) + std), lambda rng: (rng.uniform(1, 3), rng.uniform(1, 2)))
-    assert "too small on every draw" in told(item, "return 1.0 + x * 0.3 * np.cos(std) ** 2")
+    assert "too small on every draw of this check" in told(item, "return 1.0 + x * 0.3 * np.cos(std) ** 2")
 
 
 def test_what_is_small_on_the_few_draws_of_a_check_alone_is_not_said_to_be():

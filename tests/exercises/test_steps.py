@@ -458,7 +458,7 @@ def test_an_entry_of_a_right_value_is_right():
     search = steps.search(typed(body), ["a", "b"], _cases(), None, Budget(1.0))
     right = typed("d = a[:2] - np.array([1.0, 2.0])\nq = d @ d\nreturn q * b[2]")
     solution = steps.Solution(rerun.written(right), search.cases, Budget(1.0))
-    assert "`w = u + v` in line 3 is the first" in search.agreement_words(solution)
+    assert "`w = u + v` in line 3 is none of them" in search.agreement_words(solution)
 
 
 @pytest.mark.parametrize("bound", ["w = 0.2 * (a[0] + a[1])", "w = np.argmin(b) + 1"])
