@@ -180,16 +180,18 @@ def _refuse_shape(array, shape, wanted):
         raise Refused(f"{wanted}, got {'a number' if array.shape == () else f'shape {array.shape}'}{hint}")
 
 
+NOT_FINITE = (  # where to look, as long as the place is not known
+    ": look for a division by zero, the exponential of a large number or the logarithm of 0, a root of a negative"
+    " number, an arccos or arcsin of something beyond -1 and 1, or an iteration that runs away"
+)
+
+
 def _refuse_infinite(array):
     if not np.isfinite(array).all():
         bad = int((~np.isfinite(array)).sum())
         which = "NaN" if np.isnan(array).any() else "infinity"
         count = "" if array.ndim == 0 else f" in {bad} of {array.size} entries"
-        raise Refused(
-            f"the result holds {which}{count}: look for a division by zero, the exponential of a large number or the"
-            " logarithm of 0, a root of a negative number, an arccos or arcsin of something beyond -1 and 1, or an"
-            " iteration that runs away"
-        )
+        raise Refused(f"the result holds {which}{count}{NOT_FINITE}")
 
 
 def _describe(result):

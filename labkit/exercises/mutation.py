@@ -93,6 +93,10 @@ NO_COUNTS = {"polyfit", "swapaxes", "moveaxis", "roll", "diff", "matrix_power", 
 TURNED = {"sin": "cos", "cos": "sin"}
 TURNS = {90: "np.pi / 2", 180: "np.pi", 360: "2 * np.pi"}
 ROUNDING = ("round", "around")
+EDGES = (  # (functions, what they take, how it is kept there, as it is told)
+    (("arccos", "arcsin", "acos", "asin"), ("clip", (-1, 1)), "beyond -1 or 1, and `np.clip` to -1 ... 1"),
+    (("sqrt",), ("maximum", (0,)), "below 0, and `np.maximum` with 0"),
+)
 REPETITIONS = ("tile", "repeat")
 TYPED = 2  # the rank of a number that is typed in
 ROUNDED = 2e-3  # how far, relatively, a number may lie from a multiple of pi that it is meant to be
@@ -394,8 +398,8 @@ def mending(function):
     """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer,
     gone on with or begun at 0, an axis, an outer product, an index that a loop should count, an argument or a size that
     is typed in, a pi of three digits, the sign that a root has lost, a diagonal that is meant or is not, a share that a
-    comparison allows, a list that is repeated, and one slip mended wherever it stands: who copies a line copies its
-    slip.
+    comparison allows, a list that is repeated, what rounding brings beyond what a function takes, and one slip mended
+    wherever it stands: who copies a line copies its slip.
     """
     found = changes(function)
     narrower = list(_narrower(function, found))
@@ -421,6 +425,7 @@ def mending(function):
     found += _sizes(function)
     found += _of_no_share(function)
     found += _repeated(function)
+    found += _kept_within(function)
     meant = {*_digits_left(function), *_not_repeated(function), *_typed_starts(function)}
     return sorted((change for change in found if change.place not in meant), key=lambda change: change.rank)
 
@@ -447,6 +452,16 @@ def _typed_starts(function):
     for start in starts(function):
         if {n.id for n in ast.walk(start) if isinstance(n, ast.Name)} <= MODULES:
             yield from ast.walk(start)
+
+
+def _kept_within(function):
+    """Arccosines, arcsines and roots of what is kept where they are defined: rounding may bring it beyond."""
+    for call, put in _parts(function):
+        name = _called(call) if isinstance(call, ast.Call) and len(call.args) == 1 else ""
+        for names, (keep, limits), words in EDGES:
+            if name in names:
+                new = ast.Call(call.func, [_numpy(keep, call.args[0], *map(ast.Constant, limits))], call.keywords)
+                yield Change("", f"what is put in comes out {words} belongs around it", 1, call, put(new))
 
 
 def _digits_left(function):
@@ -1018,6 +1033,8 @@ def _call(node, names):
     if name == "arctan" and node.args and isinstance(getattr(node.args[0], "op", None), ast.Div):
         both = _numpy("arctan2", node.args[0].left, node.args[0].right)
         yield 0, "with `arctan2` where `arctan` of a quotient belongs", both
+    if name == "arctan" and len(node.args) == 2:  # of which it writes the result into the second
+        yield 0, "with `arctan2` where `arctan` belongs", _numpy("arctan2", *node.args)
     if name == "where" and len(node.args) == 3:
         for case in node.args[1:]:
             yield 0, "with one case treated like the other", case

@@ -53,6 +53,7 @@ NEARER = {  # what brings a result nearer on every draw, and what is said where 
 }
 COMES_NEARER = "the result comes nearer on every draw, and is not there yet"
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
+NO_CASE = re.compile("(never|always) happen$|no treatment of its own$")
 TURNED, OTHER_SIGN = "has the wrong sign", "the sign is the other one"
 UNEQUAL = ("where `==` belongs", "where `!=` belongs")  # what computed numbers are never, or always
 TRUTHS = {"`0` belongs": "`False` belongs", "`1` belongs": "`True` belongs"}
@@ -182,6 +183,27 @@ class Search:
         self.chosen = self.exactly and all(type(c.expected) is int for c in self.cases)
         self.turns = any(map(ANGLES.search, written.lines.values()))
 
+    @functools.cached_property
+    def overflows(self):
+        """Whether what is right elsewhere is wrong only where it is not finite: by rounding, it may be, so that what
+        changes but the last bits mends it.
+        """
+        wrong = [rerun.numeric(case.refused) for case in self.cases if not case.was_right]
+        finite = any(result is None or np.isfinite(result).all() for result in wrong)
+        return len(wrong) < len(self.cases) and not finite
+
+    def _is_cancelled(self, plan):
+        """Whether a value is changed where the result is right, and stays right: what was changed does not matter."""
+        kind, k, change, *other = plan
+        for values, case in zip(self.values, self.cases):
+            mine = case.args[k] if kind == "argument" else values[k][1][0] if values[k][0] else None
+            others = [case.args[i] if kind == "value" else values[i][1][-1] for i in other if i is not None]
+            if case.was_right and mine is not None:
+                mine, *others = (np.asarray(value, dtype=float) for value in (mine, *others))
+                if _changes(rerun.OTHERWISE[change][1], mine, others):
+                    return True
+        return False
+
     @_or_nothing
     def finer_words(self):
         """That a bound or a step is too coarse, or that a loop has too few rounds: before the solution is looked at,
@@ -192,8 +214,8 @@ class Search:
     @_or_nothing
     def words(self):
         """What is wrong where, from the likeliest kind of change to the least; None where nothing mends the result."""
-        words = self.code_words(range(WORTH))
-        return words or self.value_words() or self.code_words(range(WORTH, 9))
+        words = self.code_words(range(WORTH)) or self.value_words()
+        return words or (None if self.overflows else self.code_words(range(WORTH, 9)))
 
     def mending(self, plans, values=None):
         """The first plan that makes the result right on all draws; None where none does in time."""
@@ -211,6 +233,8 @@ class Search:
 
     def _is_answer(self, plan):
         """Whether the function with this change would be taken as an answer, as far as fresh draws tell."""
+        if self.overflows and plan[0] in ("value", "own", "argument") and self._is_cancelled(plan):
+            return False
         fresh = (self.written.results([plan], c.args, self.budget.left(), c.keep) for c in self.judging.more(plan[0]))
         if any(fit != [True] for fit in fresh):
             return False
@@ -238,8 +262,9 @@ class Search:
         plan = self.mending([("code", k) for k in likely if not self._moves_a_bound(*changes[k][1:])])
         if plan is None:
             return None
-        _, line, code, mends = changes[self._left_out_instead(plan[1])]
-        mends = self._of_truth(mends)
+        told = self._left_out_instead(plan[1])
+        _, line, code, mends = changes[told]
+        mends = self._of_truth(mends) + self._if_at_all(told)
         words = self._whatever_words(line, code, mends) or self._weight_words(line, mends)
         return words or f"in line {line}, `{code}`: {mends}. {ALONE}"
 
@@ -247,6 +272,15 @@ class Search:
         """The words of a change to 0 or 1 where True or False is asked for."""
         asked = all(isinstance(case.expected, bool) for case in self.cases)
         return re.sub("`[01]` belongs", lambda said: TRUTHS[said[0]], mends) if asked else mends
+
+    def _if_at_all(self, number):
+        """That a case of which the bound is made finer may be left out, where that mends as well."""
+        line, code, mends = self.written.changes[number][1:]
+        others = enumerate(self.written.changes) if mends.endswith("will do") else ()
+        plans = [
+            ("code", k) for k, (_, at, text, words) in others if at == line and NO_CASE.search(words) and code in text
+        ]
+        return ", if this case is needed at all" if plans and self.mending(plans) else ""
 
     def _whatever_words(self, line, code, mends):
         """That a comparison does not belong there, where a change mends only because it comes out alike for all: `==`
@@ -743,7 +777,7 @@ class Search:
                 mine, theirs = (
                     any(values[i][0] > 1 for values in v) for i, v in ((k, self.values), (q, solution.values))
                 )
-                each = (self._in_which_round(k) if theirs else ", a part of it in each round") if mine else ""
+                each = (self._in_which_round(k) if theirs else ", a part of it each time") if mine else ""
                 others = " on some draws" if any(case.was_right for case in self.cases) else ""
                 return f"{self._where(k)}, stands the right result{each}, but something else is returned{others}"
         return None

@@ -76,6 +76,11 @@ class Trial(Raised, Staying):
     def _run_property(self, holds, function, rng):
         return guard.run(holds, (function, rng), limit=self.exercise.limit, author=self.function)
 
+    def _refused(self, words, mended):
+        """A refused result, with words beside it; where a place is told that mends it, none is to be looked for."""
+        refusal = self.refusal.replace(metrics.NOT_FINITE, "") if mended else self.refusal
+        return self.outcome(NOT_YET, closed(refusal) + words + self._about_globals())
+
     def verdict(self):
         """Compare what came back with the references, then the named mistakes, then by the general layer."""
         if all(m is None or m.equal(r, e) for m, (r, e) in zip(self.metrics, self.pairs)) and not self.refusal:
@@ -99,13 +104,13 @@ class Trial(Raised, Staying):
         words = words or (not self.refusal and step)
         if words:
             return self.outcome(NOT_YET, closed(words) + self._about_globals())
+        mended = bool(step)
         if search and not step and not self._right_often():
             step = search.not_finite_words() if self.refusal else None
             step = step or nearer or search.partly_words() or search.given_words(solution)
         if self.refusal:
             words = shape or (f" {step[0].upper()}{closed(step[1:])}" if step else "")
-            words = words or self._agreement(search, solution)
-            return self.outcome(NOT_YET, closed(self.refusal) + words + self._about_globals())
+            return self._refused(words or self._agreement(search, solution), mended)
         if step:
             return self.outcome(NOT_YET, closed(step) + self._about_globals())
         if self._right_on_plain():

@@ -437,6 +437,12 @@ def motions(F, S):
     inv = np.linalg.inv
     return np.dot(inv(F[:-1]), F[1:]), np.dot(S[:-1], inv(S[1:]))
 """
+UNCLIPPED = """
+def between_axes(T, apart):
+    n = np.array([v / np.sqrt(v @ v) for v in Rotation.from_matrix(T[:, :3, :3]).as_rotvec()])
+    cosines = np.einsum("ij,ij->i", n[:-apart], n[apart:])
+    return np.arccos(cosines)
+"""
 
 
 @pytest.mark.parametrize(
@@ -458,6 +464,12 @@ def motions(F, S):
             "bound / 2",
         ),
         (own, "motions", ALL_WITH_ALL, "as `np.dot` gives them"),
+        (
+            own,
+            "between_axes",
+            UNCLIPPED,
+            "entries. In line 5, `np.arccos(cosines)`: what is put in comes out beyond -1",
+        ),
     ],
 )
 def test_what_is_told_of_a_wrong_answer(module, id, text, told):

@@ -824,6 +824,38 @@ def test_a_step_of_differences_may_be_too_short(body, told):
     assert told in said and ("step" in said) == bool(told)
 
 
+def unit_vector(rng):
+    a = rng.normal(size=2)
+    return a / np.linalg.norm(a), rng.uniform(0.5, 2.0)
+
+
+FROM_X = replace(
+    asked(lambda a, b: b * np.arccos(np.clip(a[0], -1, 1)), unit_vector),
+    metric=metrics.Numbers(1e-6),
+    noisy=(lambda rng: (np.array([1 + 2**-52, 0.0]), 1.0), metrics.Numbers(1e-6), "right, but not along x:"),
+)
+
+
+@pytest.mark.parametrize(
+    "body, told",
+    [
+        ("return b * np.arccos(a[0])", "`np.arccos(a[0])`: what is put in comes out beyond -1 or 1, and `np.clip` to"),
+        ("return b * np.arctan2(np.sqrt(1 - a[0] ** 2), a[0])", "comes out below 0, and `np.maximum` with 0 belongs"),
+    ],
+)
+def test_what_rounding_brings_beyond_what_a_function_takes_is_told(body, told):
+    said = judged(FROM_X, body)
+    assert "the result is NaN. In line 2" in said.replace("holds", "is") and told in said
+
+
+def test_what_cancels_is_not_told_where_rounding_alone_is_wrong(monkeypatch):
+    monkeypatch.setattr(steps.Search, "code_words", lambda self, ranks: None)
+    body = "c = a * 1.0\nif c[0] > 1:\n    return b * np.nan\nreturn b * np.arccos(c[0] / np.hypot(*c))"
+    assert steps.ALONE not in judged(FROM_X, body) and metrics.NOT_FINITE in judged(FROM_X, body)
+    monkeypatch.setattr(steps.Search, "overflows", False)
+    assert "`a`: half of it belongs there" in judged(FROM_X, body)
+
+
 def test_what_was_given_infinite_is_not_what_went_wrong():
     def impossible(rng):
         return np.array([-np.inf, *rng.normal(size=2)]), rng.normal()
@@ -965,8 +997,14 @@ def test_a_sign_that_only_leads_to_a_bound_is_told_as_a_weight_that_is_not_neede
         (
             lambda a, b: np.where(np.round(a, 1) > 0.5, b, 0.0),
             "d = np.maximum(np.round(a, 1) - 0.5, 0)\nreturn b * d / (d + 5e-3)",
-            "`0.005` is far too large: a millionth of it will do",
+            "`0.005` is far too large: a millionth of it will do. With",
         ),
+        (
+            lambda a, b: np.cos(b),
+            "if abs(a).min() < 0.4:\n    return 0 * b\nreturn np.cos(b)",
+            "`0.4` is far too large: a millionth of it will do, if this case is needed at all. With",
+        ),
+        (np.arctan2, "c = b * 1.0\nreturn np.arctan(a, c)", "`arctan` stands where `arctan2` belongs"),
     ],
 )
 def test_diagonals_and_what_is_added_to_a_divisor_are_told(reference, body, said):

@@ -3,6 +3,7 @@
 import functools
 
 import numpy as np
+from scipy import special
 from scipy.spatial.transform import Rotation
 
 from ...calibration import calibrate, motion
@@ -53,18 +54,18 @@ def some_motions(rng, apart, turns=(0.2, 2.0), n=None):
     return pose(exp_so3(rng.uniform(*turns, (n, 1)) * axes), rng.uniform(-300, 300, (n, 3))), apart
 
 
-def motions_about_one_axis(rng):
-    """Motions about one axis, some of them the other way, of which some cosine comes out beyond 1 in the last bits."""
+def motions_about_few_axes(rng):
+    """Eight motions each about some axes, some of them the other way: so many that some cosine comes out beyond 1 in the
+    last bits, in whichever way it is computed.
+    """
     while True:
-        n = int(rng.integers(6, 10))
-        axis = rng.normal(size=3)
-        turns = rng.uniform(0.2, 2.0, n) * np.where(np.arange(n) % 5 < 2, 1, -1)
-        T = pose(exp_so3(turns[:, None] * axis / np.linalg.norm(axis)), rng.uniform(-300, 300, (n, 3)))
-        phi = log_so3(T[:, :3, :3])
-        axes = phi / np.linalg.norm(phi, axis=1, keepdims=True)
-        apart = int(rng.integers(1, 4))
-        if np.abs((axes[apart:] * axes[:-apart]).sum(1)).max() > 1:
-            return T, apart
+        axes = np.repeat(rng.normal(size=(12, 3)), 8, axis=0)
+        turns = rng.uniform(0.2, 2.0, len(axes)) * np.where(np.arange(len(axes)) % 5 < 2, 1, -1)
+        R = exp_so3(turns[:, None] * axes / np.linalg.norm(axes, axis=1, keepdims=True))
+        phi, apart = log_so3(R), int(rng.integers(1, 4))
+        unit = phi / np.linalg.norm(phi, axis=1, keepdims=True)
+        if np.abs((unit[apart:] * unit[:-apart]).sum(1)).max() > 1:
+            return pose(R, rng.uniform(-300, 300, (len(axes), 3))), apart
 
 
 def one_pair(rng):
@@ -560,7 +561,7 @@ CHAPTER = Chapter(
             ),
             metric=metrics.Numbers(1e-7, "rad"),
             noisy=[
-                (motions_about_one_axis, metrics.Numbers(1e-6, "rad"),
+                (motions_about_few_axes, metrics.Numbers(1e-6, "rad"),
                  "right for axes in all directions, but not for parallel and opposite ones, where a cosine may come out as 1.0000000000000002:"),
                 (axes_nearly_along, metrics.Numbers(1e-6, "rad"),
                  "right for axes in all directions, but not for nearly parallel and nearly opposite ones, whose small angles count:"),
@@ -761,6 +762,8 @@ CHAPTER = Chapter(
                 Mistake(_covariance(lambda rr, n, f: rr / (f - 1) * f / (f - 2)),
                         "You took one degree of freedom too many away: with p parameters f = n - p, not n - p - 1."),
                 Mistake(_covariance(lambda rr, n, f: rr / f * (f / (f - 2)) ** 2), "Student's factor has been squared: f / (f - 2) is that of a variance already."),
+                Mistake(_covariance(lambda rr, n, f: rr / f * (special.stdtrit(f, 0.975) / special.ndtri(0.975)) ** 2),
+                        "This is what comes out with Student's quantile for 95 %, divided by the normal one's, in the place of a standard deviation. The variance of Student's law is f / (f - 2), and has no level."),
                 Mistake(_covariance(lambda rr, n, f: rr / f * f / (f + 2)), "A sign: the variance of Student's law is f / (f - 2), larger than 1."),
                 Mistake(_covariance(lambda rr, n, f: rr / (f - 1)), "Altogether you divide r^T r by f - 1. The noise r^T r / f times Student's f / (f - 2) leaves f - 2 below.",
                         id="honest_covariance-433c55"),
