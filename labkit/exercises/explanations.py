@@ -259,8 +259,11 @@ class Explanations(Named):
         return " Your function draws random numbers, so part of this may be chance: is there a way without them?"
 
     def _about(self):
-        """What the exercise tells of results that are wrong on every draw, as one more sentence."""
+        """What the exercise tells of results that are wrong on every draw, by more than digits: one more sentence."""
         if self.exercise.about is None or self.refusal or self._right_somewhere():
+            return ""
+        worst = self._worst(self._plain_pairs())
+        if worst is None or relations.not_accurate_enough(worst):
             return ""
         wrong = [(pair[0], args) for args, metric, pair in self._cases() if not metric.equal(*pair)]
         try:

@@ -1245,6 +1245,11 @@ CHAPTER = Chapter(
                     "A, B, C are taken for a rotation vector, a single turn. They are three turns, one after the other.",
                     id="kuka-rotvec",
                 ),
+                Mistake(
+                    lambda p: frames.matrix_from_kuka(np.roll(p, 3)),
+                    "This takes the first three numbers for angles and the last three for the position. x, y, z come first.",
+                    id="kuka-angles-first",
+                ),
                 *(
                     Mistake(
                         _turned_back(*wrong),
@@ -1452,6 +1457,17 @@ CHAPTER = Chapter(
                     _angles(lambda abc: np.array([abc[0], abc[1], np.pi / 2 - abc[2]])),
                     "A and B are right. np.arctan2 takes y first, then x: the sine of C before its cosine.",
                     id="kuka-swapped-C-alone",
+                ),
+                *(
+                    Mistake(
+                        _angles(lambda abc, lossy=lossy: np.array([lossy(abc[0]), abc[1], lossy(abc[2])])),
+                        f"B is right. Your A and C {bound}, as {name}s are: take np.arctan2, which knows the quadrant.",
+                        id=f"kuka-{name}-A-C",
+                    )
+                    for lossy, name, bound in (
+                        (np.abs, "arccosine", "are never negative"),
+                        (lambda angle: np.arcsin(np.sin(angle)), "arcsine", "are never beyond 90 deg"),
+                    )
                 ),
                 Mistake(
                     _angles(lambda abc: np.array([abc[0], abc[1], np.arcsin(np.sin(abc[2]))])),
