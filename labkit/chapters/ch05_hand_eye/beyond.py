@@ -933,7 +933,7 @@ LITERATURE = [
         mistakes=[
             Mistake(
                 _rotation(lambda R, t, x: _fit(t @ R, x)),
-                "You took (2-41) as it is printed. If the flange moves one way, the sphere moves the other way in the scanner: the right side is T_01 − T_02.",
+                "This is what (2-41) gives as it is printed. If the flange moves one way, the sphere moves the other way in the scanner: the right side is T_01 − T_02.",
                 id="li-sign",
             ),
             Mistake(

@@ -1180,7 +1180,7 @@ CHAPTER = Chapter(
                 *(Mistake(lambda f, x, h, small=small: (4 * _central(f, x, h * small) - _central(f, x, 2 * h * small)) / 3,
                           "Here differences of two steps are put together, so that their first errors cancel (Richardson). Asked for is the one central difference, a whole step to each side.",
                           id=f"numeric_jacobian-richardson-{small:g}") for small in (1, 0.5)),
-                Mistake(lambda f, x, h: 2 * _central(f, x, h), "Between ahead and behind lie two steps: divide by 2 h."),
+                Mistake(lambda f, x, h: 2 * _central(f, x, h), "Your result is twice too large: between ahead and behind lie two steps, so divide by 2 h."),
                 Mistake(lambda f, x, h: _central(f, x, h) * 2 * h, "You have not divided by the distance 2 h yet."),
                 Mistake(lambda f, x, h: _central(f, x, h).T, "Your matrix is the transpose: one row a function value, one column a variable."),
                 Mistake(lambda f, x, h: _central(f, x, h / 2),
