@@ -111,7 +111,9 @@ KINDS = (
     *(functools.partial(kind_of_point, bends=BOWL, length=l) for l in ((2e-6, 5e-6), (2e-5, 5e-5), (2e-4, 5e-4))),
     functools.partial(kind_of_point, bends=BOWL, length=(2e-3, 5e-3)),
     functools.partial(kind_of_point, bends=BOWL, length=STEEP, signs=(1, -1), between=(1, 1)),  # its entries cancel
-    functools.partial(kind_of_point, bends=BOWL, length=STEEP, signs=(0, 1)),  # along one axis
+    *(  # along one axis, then along the other: a rule that reads one entry alone is not one that asks for both
+        functools.partial(kind_of_point, bends=BOWL, length=STEEP, signs=s) for s in ((0, 1), (1, 0))
+    ),
     *(  # faintly bent, as out on the plain, and sharply
         functools.partial(kind_of_point, bends=bends, length=(0, 1e-8), size=size)
         for bends, size in ((BOWL, 1e-7), (DOME, 1e-7), (SADDLE, 1e-7), (DOME, 1e4), (DEEP_SADDLE, 1e4))
@@ -1083,6 +1085,14 @@ CHAPTER = Chapter(
                 ),
                 *(
                     Mistake(
+                        _stationary(_by(np.linalg.eigvalsh), lambda g, k=k: abs(g[k]) > 1e-6),
+                        f"Only the {which} entry of g decides here. What counts is the length |g|, the root of the sum of both squares.",
+                        id=f"classify-{which}-entry",
+                    )
+                    for k, which in enumerate(("first", "second"))
+                ),
+                *(
+                    Mistake(
                         _stationary(_by(np.linalg.eigvalsh), lambda g, limit=limit: np.linalg.norm(g) > limit),
                         "Right where |g| is large, and where it is tiny. But your limit is not the stated one, 1e-6.",
                         id=f"classify-limit-{k}",
@@ -1904,7 +1914,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda g, B, radius: -radius * g / np.linalg.norm(g),
-                    "That is always steepest descent to the rim: corner and Newton point are never used.",
+                    "Your result is always the point at the rim straight downhill. Where the corner or the Newton point lies within the radius, the path bends or ends there.",
                 ),
                 Mistake(
                     _dogleg(share=lambda a, b, c: (-b - np.sqrt(b * b - a * c)) / a),
