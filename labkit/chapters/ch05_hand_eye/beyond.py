@@ -903,7 +903,11 @@ LITERATURE = [
         metric=metrics.Rotations(1e-6),
         noisy=(
             (functools.partial(translated_poses, std=0.01), metrics.Rotations(0.2)),
-            (visited_twice, metrics.Rotations(1e-6), "right, but not where two of four poses are at one place:"),
+            (
+                visited_twice,
+                metrics.Rotations(1e-6),
+                "right, but not where the second and the third of four poses are at one place (is each of them heard?):",
+            ),
             (
                 first_ones_on_a_line,
                 metrics.Rotations(0.5),
