@@ -18,6 +18,7 @@ SHEARED = 1e-3  # from which on RᵀR differs from I by more than rounding
 SIMPLE = 12  # the largest number in a fraction that is worth telling
 NEARLY = 1e-3  # how nearly a result made by differences, say, must be a multiple of the right one
 EXACT = 1e-9  # how nearly two numbers have to agree for it
+SEVERAL = 3  # numbers, from which on it is no chance that they are in proportion
 LOOP = ": does a loop end too early?"  # asked where the code has one
 LONGEST = 12  # entries along the last axis that are tried one by one
 FACTORS = {"pi": np.pi, "2 pi": 2 * np.pi, "the root of 2": np.sqrt(2.0), "the root of 3": np.sqrt(3.0)}
@@ -86,6 +87,7 @@ def _relation(metric, results, expected, sizes, whole):
         return words
     near = _is_near(metric, results, expected) or _all_equal(results, expected)
     part = None if near else _of_other_places(results, expected) or _nearly_a_factor(results, expected)
+    part = part or (None if near else _a_factor_of_each_draw(results, expected))
     part = part or (None if near else _one_part(results, expected, holds, unit))
     return part or _offset(results, expected, unit)
 
@@ -327,6 +329,18 @@ def _nearly_a_factor(results, expected):
     factor = found.pop()
     times = f"{factor}" if abs(factor) > 1 else f"{'-' if factor < 0 else ''}1/{round(1 / abs(factor))}"
     return f"your result is nearly {times} times the expected one, within a thousandth of its size, on every draw"
+
+
+def _a_factor_of_each_draw(results, expected):
+    """Several numbers that are right in proportion, on every draw."""
+    if len(results) < 2 or any(np.count_nonzero(e) < SEVERAL for e in expected):
+        return None
+    if any(constant_ratio(r, e, EXACT) is None for r, e in zip(results, expected)):
+        return None
+    return (
+        "your result is the expected one times a number that is not the same on every draw: is it to be divided by "
+        "another one, its sum or its length, say?"
+    )
 
 
 def _times(ratio, sizes):

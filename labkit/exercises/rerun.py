@@ -567,7 +567,7 @@ def _of_its_shape(change):
     return changed
 
 
-SIGNLESS = "it belongs there without its sign"
+SIGNLESS = "its absolute value belongs there"
 OPPOSITE = "1 less it, 1 - ..., belongs there"
 NOUGHT, ONE = "it does not belong there, but 0 in its place", "it does not belong there, but 1 in its place"
 IDENTITY = "the identity belongs in its place"

@@ -741,7 +741,10 @@ class Search:
     def _is_value(self, k, theirs, same=None):
         """Whether a value on the way is another one on every draw, round by round; or one of rounds, row by row."""
         mine, same = [values[k] for values in self.values], same or _same
-        return all(count and (same(m, t) or len(t) == 1 and same(m, t[0])) for (count, m), t in zip(mine, theirs))
+        return all(
+            count and (same(m, t) or len(t) == 1 and same(m, _as_kept(t[0], count)))
+            for (count, m), t in zip(mine, theirs)
+        )
 
     def _is_returned(self, k):
         """Whether a value is what comes out on every draw on which that is of a kind to be compared."""
@@ -756,7 +759,7 @@ class Search:
         rounds = [_in_rounds(values[k], v[q])[1] for values, v in zip(self.values, solution.values)]
         theirs = [np.broadcast_to(t, m.shape) for t, m in zip(rounds, mine)]
         words = value_relation(mine, theirs, [dict(zip(self.names, case.args)) for case in self.cases])
-        words = words or f"this value is not right{self._of_right_parts(k, solution)}"
+        words = words or f"this value is not right{self._of_parts(k, solution)}"
         end = "" if words[-1] in ".?" else "."
         return f"{self._where(k)}: {words}{end} With the right value there, all that follows is right"
 
@@ -819,6 +822,7 @@ class Search:
         units = self._units(solution)
         right = [
             self._is_known(k, solution, False)
+            or self._is_in_each_round(k, solution)
             or self._is_row(k, solution)
             or self._is_part(k, solution)
             or self._is_part(k, solution, _same_but_for_turns)
@@ -853,8 +857,8 @@ class Search:
         return [k for k in steps if k not in inner and not self._is_filled(k)]
 
     def _has_counterpart(self, k, solution):
-        """Whether the solution has a value of this kind that is none of the student's: the one that this should be. One
-        that has it up to a factor may well be right: the factor can follow.
+        """Whether the solution has a value of this kind, as often, that is none of the student's: the one that this
+        should be. One that has it up to a factor may well be right: the factor can follow.
         """
         mine = [values[k] for values in self.values]
         if any(_are_proportional(mine, [values[q] for values in solution.values]) for q in solution.distinct):
@@ -866,9 +870,18 @@ class Search:
             lacking = not any(
                 self._is_value(other, [t for _, t in theirs]) for other in range(len(self.written.places))
             )
-            if lacking and all(map(_exchangeable, mine, theirs)):
+            if lacking and all(map(_are_as_many, mine, theirs)) and all(map(_exchangeable, mine, theirs)):
                 return True
         return False
+
+    def _is_in_each_round(self, k, solution):
+        """Whether a value that is computed once is that of the solution in each of its rounds."""
+        once = all(values[k][0] == 1 for values in self.values)
+        rounds = ([values[q][1] for values in solution.values] for q in solution.distinct if once)
+        return any(
+            self._is_value(k, [t[:1] for t in theirs]) and not any(np.ptp(t, axis=0).any() for t in theirs)
+            for theirs in rounds
+        )
 
     def _is_row(self, k, solution):
         """Whether a value is a row of one of the solution's values that has few: several results taken apart, say."""
@@ -916,19 +929,24 @@ class Search:
             return False  # a count, or several values that are steps of their own
         return any(not _same(mine[0][0], other[0]) for other in mine[1:]) and not self._is_given(k)
 
-    def _of_right_parts(self, k, solution):
-        """Whether the parts of a wrong value are right, so that it is what is done with them."""
+    def _may_be_wrong(self, k, solution):
+        """Whether a value is but read there, by the name it was given in another line, and is none that is right."""
+        name = self.written.places[k][1]
+        return name.isidentifier() and name not in self.names and not self._is_known(k, solution, False)
+
+    def _of_parts(self, k, solution):
+        """Whether the parts of a wrong value are right, so that it is what is done with them; or may be wrong."""
         parts, part = [], k - 1
         while part >= self.written.places[k][4]:
             parts.insert(0, part)
             part = self.written.places[part][4] - 1
         parts = [part for part in parts if all(values[part][0] for values in self.values)]
-        if not all(self._is_known(part, solution) for part in parts):
-            return ""
-        computed = (part for part in parts if not self._is_given(part))  # another argument may be meant
+        right = all(self._is_known(part, solution) for part in parts)
+        computed = (part for part in parts if right and not self._is_given(part))  # another argument may be meant
         codes = dict.fromkeys(f"`{self.written.places[part][1]}`" for part in computed)
         if not codes:
-            return ""
+            inner = range(self.written.places[k][4], k)
+            return ", perhaps for one that goes into it" if any(self._may_be_wrong(p, solution) for p in inner) else ""
         are, them = ("are values", "them") if len(codes) > 1 else ("is a value", "it")
         return f", though {' and '.join(codes)} in it {are} of the solution as well: look at what is done with {them}"
 
@@ -1121,6 +1139,18 @@ def _in_rounds(mine, theirs):
     """(count, values) of the solution, row by row where the student's loop takes one row of it in each round."""
     (count, a), (turns, b) = mine, theirs
     return (count, b[0]) if turns == 1 and count > 1 and b.shape[1:2] == (count,) and b.ndim > a.ndim else theirs
+
+
+def _as_kept(rows, count):
+    """Those rows of the solution's value that a loop goes through while its values are kept."""
+    return rows[:count] if rows.ndim and len(rows) > count == rerun.ROUNDS else rows
+
+
+def _are_as_many(mine, theirs):
+    """Whether a value comes in as many rounds as the solution's, or row by row of it: other rounds are another way. Of
+    more rounds than are kept nobody knows.
+    """
+    return mine[0] == _in_rounds(mine, theirs)[0] < rerun.ROUNDS
 
 
 def _exchangeable(mine, theirs):

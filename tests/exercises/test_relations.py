@@ -51,6 +51,7 @@ def changed(index, value):
         (np.linalg.inv, SQUARES, "the inverse of the expected one"),
         (np.square, VECTORS, "the square of the expected one"),
         (np.reciprocal, VECTORS, "the reciprocal of the expected one"),
+        (lambda e: e / np.linalg.norm(e), VECTORS, "times a number that is not the same on every draw"),
         (np.trunc, [9 * e for e in TABLES], "the right one without its decimals"),
     ],
 )

@@ -542,6 +542,20 @@ def test_a_wrong_value_is_told_where_it_is_bound_not_where_it_is_read():
     """
     said = item.judge(typed(body, "robust_weights", "residuals"), rng=np.random.default_rng(0)).text
     assert "in line 2, `length = np.abs(residuals).max(axis=1)`: this value is not right" in said
+    assert "for one that goes into it" not in said
+
+
+def test_a_wrong_value_may_be_wrong_for_one_that_goes_into_it():
+    item = next(c for c in session.chapters() if c.name == "09-monte-carlo")["landmark_weight"]
+    body = """
+        seen = ((landmarks - pose[:2]) @ [1, 1j]) * np.exp2(-1j * pose[2])
+        turn = np.angle(np.exp(1j * z[:, 1]) * np.conj(seen))
+        e = ((z[:, 0] - np.abs(seen)) / std_range) ** 2 + (turn / std_bearing) ** 2
+        return np.sum(-0.5 * e - np.log(2 * np.pi * std_range * std_bearing))
+    """
+    wrong = typed(body, "landmark_weight", "pose, z, landmarks, std_range, std_bearing")
+    said = item.judge(wrong, rng=np.random.default_rng(0)).text
+    assert "in line 3, `turn = " in said and "this value is not right, perhaps for one that goes into it." in said
 
 
 def test_a_loop_that_takes_the_rows_of_the_solutions_array_one_by_one_is_compared_with_them():
@@ -731,6 +745,27 @@ def test_of_steps_of_its_own_none_is_told_to_be_the_first_that_disagrees(monkeyp
     )
     told = judged(asked(solved_by(monkeypatch, text), two_numbers), body)
     assert "As far as `x` (line 2) your values are those of the solution." in told
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        ("x = a * b\nfor k in range(7):\n    y = np.sin(k * a) - 3 * x**2\nreturn x * y", "(line 2) your values"),
+        ("x = a * b\nt = np.exp(b)\ny = np.sin(a)\nreturn x * y - 2 * t**3", "`y = np.sin(a)` in line 4 is the first"),
+    ],
+)
+def test_rounds_of_another_number_are_another_way_and_what_stays_in_each_may_be_computed_once(monkeypatch, body, told):
+    text = (
+        "def formula(a, b):\n    x, s = a * b, 0.0\n    for k in range(3):\n        t = np.exp(b)\n"
+        "        y = a + k * x\n        s += t * y\n    z = x - a**2\n    return s * z\n"
+    )
+    said = judged(asked(solved_by(monkeypatch, text), two_numbers), body)
+    assert told in said and ("is the first" in said) == ("is the first" in told)
+
+
+def test_of_more_rows_than_rounds_are_kept_the_first_are_compared():
+    assert len(steps._as_kept(np.zeros((20, 3)), rerun.ROUNDS)) == rerun.ROUNDS
+    assert len(steps._as_kept(np.zeros((20, 3)), 5)) == 20 and steps._as_kept(np.array(1.0), 16) == 1.0
 
 
 def test_what_agrees_ends_at_the_first_step_that_does_not(monkeypatch):
@@ -1148,7 +1183,7 @@ def test_what_a_number_bounds_can_have_the_wrong_sign_alone():
     sides = tuple(functools.partial(on_either_side, side=side) for side in (1, -1, 0))
     item = asked(lambda a, b: a + np.sinc(a / np.pi), sides)
     said = judged(item, "h = 1.0 * a\nreturn h + (np.sin(h) / h if h > 1e-8 else 1.0)")
-    assert said.startswith("in line 3, `h` in `h > 1e-8`: it belongs there without its sign."), said
+    assert said.startswith("in line 3, `h` in `h > 1e-8`: its absolute value belongs there."), said
 
 
 def chosen(rng):
