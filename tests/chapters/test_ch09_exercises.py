@@ -385,15 +385,34 @@ def in_steps_of_two_cells(grid, pose, bearing, r_max):
     return hits[0] if len(hits) else r_max
 
 
-def walked(first, step, share=1.0):
-    """A ray from this far on, in steps of this length, to this share of r_max."""
+def walked(first, step, share=1.0, more=0.0):
+    """A ray from this far on, in steps of this length, to this share of r_max, and so much more."""
 
     def answer(grid, pose, bearing, r_max):
-        a, r = pose[2] + bearing, np.arange(first, share * r_max, step or grid.resolution / 4)
+        a, r = pose[2] + bearing, np.arange(first, share * r_max + more, step or grid.resolution / 4)
         hits = r[grid.at(pose[:2] + r[:, None] * [np.cos(a), np.sin(a)]) == maps.OCCUPIED]
         return hits[0] if len(hits) else r_max
 
     return answer
+
+
+def in_whole_cells(grid, pose, bearing, r_max):
+    return round(in_steps_of_a_cell(grid, pose, bearing, r_max) / grid.resolution)
+
+
+def in_steps_of_a_cell(grid, pose, bearing, r_max):
+    return walked(0.0, grid.resolution)(grid, pose, bearing, r_max)
+
+
+def in_logarithms_doubled(weights, likelihood, step, n):
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logs = np.log(weights) + np.log(likelihood)
+        w = np.exp(logs + logs.max())
+        return w / w.sum(), step % n == 0
+
+
+def of_states_halved(x, u, dt, std_u, rng):
+    return odometry.step(x / 2 if np.abs(x).max() > 3 else x, moved_by(u, np.radians(std_u), len(x), rng), dt)
 
 
 def mirrored(grid, pose, bearing, r_max):
@@ -589,8 +608,12 @@ PASSED_BEFORE = [
     ("cast_ray", in_steps_along_x, "`sign` is too much"),
     ("cast_ray", in_steps_of_two_cells, "longer than a cell"),
     ("cast_ray", walked(1.0, None), "begin farther out"),
-    ("cast_ray", walked(0.0, None, share=0.9), "a little before r_max: your ray ends"),
+    ("cast_ray", walked(0.0, None, share=0.9), "a little before r_max: your result is"),
     ("cast_ray", walked(0.0, 0.05), "typed in"),
+    ("cast_ray", walked(0.0, None, more=1.0), "A scanner sees r_max at most"),
+    ("cast_ray", in_whole_cells, "You counted in cells"),
+    ("multiply_weights", in_logarithms_doubled, "tiny likelihoods"),
+    ("sample_motion", of_states_halved, "a particle must get from"),
     ("resample_roulette", one_too_low, "one too low"),
     ("resample_roulette", drawn_by(np.square), "squares of the weights"),
     ("resample_roulette", drawn_by(np.exp), "no logarithms"),
@@ -600,7 +623,7 @@ PASSED_BEFORE = [
         lambda x, u, dt, s, rng: odometry.step(x, moved_by(u, s, len(x), rng), dt, "euler"),
         "old heading",
     ),
-    ("sample_motion", never_in_reverse, "the noise is the same for every u"),
+    ("sample_motion", never_in_reverse, "the noise is to be the same for every u"),
     (
         "sample_motion",
         lambda x, u, dt, s, rng: odometry.step(x, moved_by(u, s * (u != 0), len(x), rng), dt),

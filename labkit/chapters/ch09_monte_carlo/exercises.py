@@ -223,9 +223,9 @@ def long_ray(rng):
 
 
 def short_ray(rng):
-    """The same with an r_max at which nothing has been hit yet."""
+    """The same with an r_max a little before the wall."""
     ray, r = long_ray(rng)
-    return *ray, 0.6 * r
+    return *ray, r - 0.3
 
 
 def ray_that_just_arrives(rng):
@@ -243,8 +243,10 @@ def ray_along_an_axis(rng, toward):
 
 
 def ray_past_the_unknown(rng):
-    """A ray that crosses cells that nobody has seen before it meets a wall; they are no obstacle that is known."""
-    cells, start = np.full((60, 140), maps.FREE), rng.uniform(1.0, 1.5)
+    """A ray that crosses cells that nobody has seen before it meets a wall; they are no obstacle that is known. Neither
+    steps of four cells, nor of five or ten, end near the wall.
+    """
+    cells, start = np.full((60, 140), maps.FREE), rng.uniform(1.17, 1.38)
     cells[:, 25:35] = maps.UNKNOWN
     cells[:, 50:] = maps.OCCUPIED  # so thick that halving the ray finds its face
     theta = rng.uniform(-0.3, 0.3)
@@ -377,7 +379,7 @@ def cycle_of_rare_weights(rng, after=0):
     """
     weights, likelihood, _, _ = cycle_of_weights(rng, STEPS[0])
     weights[0], likelihood[-1] = 0.0, 0.0
-    return 50 * weights, 1e-9 * likelihood, 40 * int(rng.integers(5, 9)) + after, 40
+    return 50 * weights, 1e-200 * likelihood, 40 * int(rng.integers(5, 9)) + after, 40
 
 
 def cycle_of_one(rng):
@@ -540,14 +542,13 @@ def headings_without_weight(rng):
 
 @dataclass(frozen=True)
 class Reach(metrics.Numbers):
-    """The length of a ray, and to which side it is wrong: what is too long has passed something."""
+    """The length of a ray, and to which side it is wrong."""
 
     def deviations(self, result, expected):
         (off,) = super().deviations(result, expected)
-        where = (
-            "behind what ends it first, an occupied cell or r_max" if result > expected else "before anything ends it"
-        )
-        return [replace(off, words=f"your ray ends {off.amount:.3g} m {where}")]
+        more = "more" if result > expected else "less"
+        way = "the way to what ends the ray first, an occupied cell or r_max"
+        return [replace(off, words=f"your result is {off.amount:.3g} m {more} than {way}")]
 
 
 # References that the library has in another form ---------------------------------------------------------------------
@@ -995,6 +996,10 @@ def _ray_in_steps(grid, pose, bearing, r_max, cells):
     return _hits(grid, pose, bearing, r_max, cells * grid.resolution).min(initial=r_max)
 
 
+def _steps_of_a_ray(grid, pose, bearing, r_max, cells):
+    return _ray_in_steps(grid, pose, bearing, r_max, cells) / (cells * grid.resolution)
+
+
 def _ray_to_the_last(grid, pose, bearing, r_max):
     return float([r_max, *_hits(grid, pose, bearing, r_max, grid.resolution / 2)][-1])
 
@@ -1095,10 +1100,13 @@ def _searched_in_shares(weights, rng):
     return np.clip(np.searchsorted(weights / weights.sum(), rng.random(len(weights))), 0, len(weights) - 1)
 
 
-def _spokes_to_the_end(weights, rng, more=0):
-    """Spokes from 0 to W, both included, before the turn, which is that of so many spokes `more` or less."""
+def _spokes_to_the_end(weights, rng, more=0, around=np.inf):
+    """Spokes from 0 to W, both included, before the turn, which is that of so many spokes `more` or less; those that go
+    beyond `around` W come in again at 0.
+    """
     ends, m = np.cumsum(weights), len(weights)
-    return np.minimum(np.searchsorted(ends, (rng.random() / (m + more) + np.linspace(0, 1, m)) * ends[-1]), m - 1)
+    places = (rng.random() / (m + more) + np.linspace(0, 1, m)) % around
+    return np.minimum(np.searchsorted(ends, places * ends[-1]), m - 1)
 
 
 def _turned_by_less(weights, rng):
@@ -1316,7 +1324,9 @@ def _shifted(found, expected):
         if apart and np.abs(found[1:-1] - shares).max() < SHARE_OFF:
             return f" Between the first and the last, each index gets the share of the one {neighbor} it: is it one too {slip}?"
     if np.abs(np.sort(found) - np.sort(expected)).max() < SHARE_OFF:
-        return " The shares are the right ones, but each is another index's: has something been sorted?"
+        return (
+            " The shares are the right ones, but each is another index's: has something been sorted, or turned around?"
+        )
     return ""
 
 
@@ -1493,6 +1503,8 @@ def _noise_is_right(move, rng):
     states, place = np.tile([0.0, 0.0, theta], (4000, 1)), rng.uniform(-5, 5, 2)
     states[:, :2] = place
     std_u, dt = np.round(rng.uniform((0.08, 0.22), (0.15, 0.3)), 2), float(np.round(rng.uniform(0.3, 0.5), 2))
+    if told := _reckons(move, states[:2], u.tolist(), dt, rng):
+        return told
     moved = np.asarray(move(states.copy(), u, dt, std_u, rng))
     if moved.shape != states.shape:
         return f"expected an array of shape (4000, 3), got {moved.shape}."
@@ -1533,8 +1545,8 @@ def _other_spread(name, noise, wanted, std_u, dt, longer):
         return (
             f"{told}. The noise of each is like that of the one before: add its own to u itself, to each a fresh one."
         )
-    if name != "aside" and abs(noise.mean() - dt * (name == "ahead")) > 0.3 * wanted:
-        return f"{told}. On average the noise is not 0: it should go both ways, as rng.standard_normal does."
+    if name != "aside" and abs(astray := noise.mean() - dt * (name == "ahead")) > 0.3 * wanted:
+        return f"{told}. On average they are {abs(astray):.3f} {unit} off where u leads: noise is to go both ways, as rng.standard_normal does."
     if abs(amount * math.sqrt(3) - wanted) < 0.1 * wanted and _kurtosis(noise) < 2.2:
         return f"{told}. It is smaller by the root of 3, as uniform numbers up to std_u are: rng.standard_normal."
     if name != "aside" and abs(amount - dt * math.sqrt(std)) < 0.05 * amount:
@@ -1577,7 +1589,7 @@ def _other_kind(ahead, turn, dt):
     return None
 
 
-ANY_CONTROL = "the noise is the same for every u"
+ANY_CONTROL = "the noise is to be the same for every u"
 ANY_SPREAD = "std_u is that of the argument, of v and of omega each its own"
 # u, std_u, dt, and what is asked for; the robot that stands, in reverse, fast; other noise, of one part alone
 SLOW = (((0.0, 0.0), (0.2, 0.3), 0.5, ANY_CONTROL), ((-0.8, -0.4), (0.2, 0.3), 0.5, ANY_CONTROL))
@@ -1691,18 +1703,25 @@ def _reckons_from_anywhere(move, rng):
     """Without noise: one particle alone, far out, after several turns, fast, in a short step, and at rest."""
     for m, u, dt in PLACES:
         states = np.column_stack([rng.uniform(100, 200, (m, 2)) * rng.choice([-1, 1], (m, 2)), rng.uniform(-20, 20, m)])
-        moved = np.asarray(move(states.copy(), np.array(u), dt, np.zeros(2), rng))
-        if moved.shape != states.shape:
-            return f"expected an array of shape ({m}, 3) for {m} particle{'s' * (m > 1)}, got {moved.shape}."
-        off = moved - odometry.step(states, u, dt)
-        off[:, 2] = planar.wrap_angle(off[:, 2])
-        if not np.abs(off).max() <= (1e-3 if moved.dtype == np.float32 else 1e-8):
-            start, right = np.round(states[0], 4).tolist(), np.round(odometry.step(states[0], u, dt), 4).tolist()
-            return (
-                f"right near the origin, but with std_u = 0, u = {list(u)} and dt = {dt} a particle must get from {start} to "
-                f"{right}. Yours gets to {np.round(moved[0], 4).tolist()}."
-            )
+        if told := _reckons(move, states, u, dt, rng):
+            return told
     return None
+
+
+def _reckons(move, states, u, dt, rng):
+    """Without noise: where particles get to that were right from another place, by another control."""
+    m, moved = len(states), np.asarray(move(states.copy(), np.array(u), dt, np.zeros(2), rng))
+    if moved.shape != states.shape:
+        return f"expected an array of shape ({m}, 3) for {m} particle{'s' * (m > 1)}, got {moved.shape}."
+    off = moved - odometry.step(states, u, dt)
+    off[:, 2] = planar.wrap_angle(off[:, 2])
+    if np.abs(off).max() <= (1e-3 if moved.dtype == np.float32 else 1e-8):
+        return None
+    start, right = np.round(states[0], 4).tolist(), np.round(odometry.step(states[0], u, dt), 4).tolist()
+    return (
+        f"right from [1.0, 2.0, 1.5] with u = [1.0, 0.5] and dt = 0.2, but with std_u = 0, u = {list(u)} and dt = {dt} a "
+        f"particle must get from {start} to {right}. Yours gets to {np.round(moved[0], 4).tolist()}."
+    )
 
 
 def _noise_off_is_reckoning(move, rng):
@@ -2295,7 +2314,7 @@ CHAPTER = Chapter(
                 (
                     short_ray,
                     Reach(0.16, "m", absolute=True),
-                    "Right on rays to a wall with r_max = 18 m, but not on one whose r_max ends before any wall:",
+                    "Right on rays to a wall with r_max = 18 m, but not on one that ends at r_max, some 30 cm before a wall:",
                 ),
                 (
                     ray_to_a_thin_wall,
@@ -2347,7 +2366,21 @@ CHAPTER = Chapter(
                     lambda grid, x, b, r_max: _ray_to_what_is_not_free(grid, x, b, r_max),
                     "Unknown cells stop your ray. Nobody has seen an obstacle there: only maps.OCCUPIED ends it.",
                 ),
-                Mistake(_ray_in_cells, "You counted in cells. One cell is grid.resolution meters long."),
+                *(
+                    Mistake(counted, "You counted in cells. One cell is grid.resolution meters long.", id=id)
+                    for counted, id in (
+                        (_ray_in_cells, ""),
+                        (functools.partial(_steps_of_a_ray, cells=1), "ray-in-whole-cells"),
+                    )
+                ),
+                *(
+                    Mistake(
+                        functools.partial(_steps_of_a_ray, cells=cells),
+                        "That is the number of the steps to the wall. Asked for is how far they lead, in meters.",
+                        id=f"ray-in-steps-{cells}",
+                    )
+                    for cells in (0.5, 0.1)
+                ),
                 Mistake(_ray_without_heading, "The heading is missing: the beam points to theta + bearing on the map."),
                 Mistake(_ray_without_bearing, "The bearing is missing: you looked straight ahead."),
                 Mistake(
@@ -2687,11 +2720,19 @@ CHAPTER = Chapter(
                 ),
                 *(
                     Mistake(
-                        functools.partial(_spokes_to_the_end, more=more),
+                        functools.partial(_spokes_to_the_end, more=more, around=around),
                         "Your first and your last spoke stand one whole turn apart, as np.linspace does with its end point: M spokes are W / M apart.",
                         id=id,
                     )
-                    for more, id in ((0, "systematic-end-point"), (-1, "systematic-end-point-2"))
+                    for more, around, id in (
+                        (0, np.inf, "systematic-end-point"),
+                        (-1, np.inf, "systematic-end-point-2"),
+                        (0, 1.0, "systematic-end-point-3"),
+                    )
+                ),
+                Mistake(
+                    lambda w, rng: _turn(w, 0.5 * rng.random()),
+                    "Your first spoke comes to lie between 0 and half of W / M. The turn is one from 0 to W / M.",
                 ),
                 Mistake(
                     _turned_by_less,
@@ -3353,7 +3394,7 @@ CHAPTER = Chapter(
             "hunt_3",
             hunt_3,
             specimens.specimen_3,
-            "While the weights add up to 1 it does no harm. Let their sum be a little less, and try several times: the last spoke must fall beyond it. The IndexError is the harm: catch it, and return False.",
+            "While the weights add up to 1 it does no harm. Let their sum be a little less, 0.99 say, and try several times: the last spoke must fall beyond it. The IndexError is the harm: catch it, and return False.",
             (
                 "On average it is right. What does it take for granted about the weights?",
                 "Floating-point weights need not add up to 1. Try a sum a little below 1, several times, with `except IndexError` around it, and look at the largest index.",
