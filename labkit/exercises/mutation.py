@@ -44,6 +44,7 @@ TWINS = {name: (twin,) for pair in PAIRS for name, twin in (pair, pair[::-1])} |
 WRAPPERS = {"array", "asarray", "float", "int", "list", "tuple", "range", "len", "zip", "enumerate", "bool", "set"}
 MODULES = {"np", "numpy", "math", "scipy"}  # what they hold is no data of the notebook
 CAST = "astype"  # the argument of which is no value
+APPLIED = {"dot", "apply"}  # methods without which their argument is left, not what they are called of
 NO_SEARCH = {"map", "filter", "sorted", "max", "min", "sum", "vectorize", "fromfunction", "apply_along_axis", "reduce"}
 GUARD = 1e-3  # below which a bound stands for 0
 BOUNDED = {"clip"}  # exchanged, a value and its bound make a constant: that mends, and is not what happened
@@ -1016,7 +1017,7 @@ def _root(node):
 
 def _call(node, names):
     name = getattr(node.func, "attr", getattr(node.func, "id", ""))
-    inner = node.args[0] if node.args and name != CAST else getattr(node.func, "value", None)
+    inner = _what_is_called_upon(node, name, names)
     if name in ARRAYS and not any(keyword.arg == "dtype" for keyword in node.keywords):
         floats = [*node.keywords, ast.keyword("dtype", ast.Name("float", ast.Load()))]
         yield 2, WHOLE, ast.Call(node.func, node.args[:1], floats)
@@ -1048,6 +1049,18 @@ def _call(node, names):
     yield 3, "with one part squared", ast.BinOp(node, ast.Pow(), ast.Constant(2))
     yield 3, "with the root of one part taken", _numpy("sqrt", node)
     yield from [] if name in NO_ANGLES else [(3, IN_DEGREES, _numpy("rad2deg", node))]
+
+
+def _what_is_called_upon(node, name, names):
+    """What is left of a call without it: its first argument, or the value of which it is a method, as a text is; None
+    for a value that is rounded, which is not often what is wrong.
+    """
+    owner = getattr(node.func, "value", None)
+    is_value = _root(owner) in {*names[0], *names[1]} or isinstance(owner, ast.Call | ast.Subscript | ast.BinOp)
+    if is_value and node.args and name in ROUNDING:
+        return None
+    of_the_owner = is_value and name not in APPLIED or name == CAST
+    return node.args[0] if node.args and not of_the_owner else owner
 
 
 NO_ANGLES = {"norm", "hypot", "sqrt", "eigvalsh", "eigvals", "det", "median", "trace", "len"}  # what these return

@@ -404,6 +404,12 @@ def first_gain_twice(x0, var0, z, stds):
     return x + k * (z[1] - x), (1 - k) * (1 - k) * var0
 
 
+def the_better_alone(x0, var0, z, stds):
+    k = np.argmin(stds)
+    gain = var0 / (var0 + stds[k] ** 2)
+    return x0 + gain * (z[k] - x0), (1 - gain) * var0
+
+
 def twenty_rounds(A, C, cov_v, cov_z):
     P = np.eye(len(A))
     for _ in range(20):
@@ -465,6 +471,12 @@ def in_degrees_and_half_of_what_is_large(x0, cov0, z, C, cov_z):
         ("fuse_two_sensors", first_gain_twice, "The second sensor gets the gain of the first"),
         ("batch_estimate", rows_repeated, "np.tile"),
         ("gate", two_slips, "Two slips"),
+        ("fuse_two_sensors", the_better_alone, "the better one alone counts"),
+        (
+            "measurement_jacobian",
+            lambda x, landmark: ch08.measurement_jacobian(x, landmark).T.reshape(2, 3),
+            "row by row where they belong column by column",
+        ),
         ("gate", lambda y, S, limit: bool((y**2 < limit * np.diag(S)).all()), "Each number is judged by itself"),
         ("wrap_angle", lambda a: np.fmod(a + np.pi, 2 * np.pi) - np.pi, "An angle below -pi ends below -pi"),
         ("steady_state_gain", twenty_rounds, "these are too few rounds: 400 will do"),

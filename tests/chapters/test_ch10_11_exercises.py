@@ -111,6 +111,7 @@ def test_the_frame_of_these_answers_is_right():
         ("return abs(x[:-1].mean() - x[-1])", "return x[:-1].mean() - x[-1]", "take its absolute value"),
         ("x[:-1].mean() - x[-1]", "np.median(x[:-1]) - x[-1]", "compare with the median"),
         ("    return found", "    return found if len(found) == 1 else set()", "several could have slipped"),
+        ("    return found", "    return {len(entries)} & found or found", "only where the average cannot be it"),
         (TRIED, TRIED.replace("texts.copy()", "texts") + "; break", "take a fresh copy for each"),
         (MEAN_AND_AVERAGE, "round(x[:-1].mean(), 2) == round(x[-1], 2)", "the same decimals in every"),
     ],
@@ -406,6 +407,20 @@ def half_unit(printed):
     number, _, exponent = repr(float(printed.replace(",", "."))).partition("e")
     return 0.5 * 10.0 ** (int(exponent or 0) - len(number.partition(".")[2].rstrip("0")))
 """
+OF_ITS_FIRST_DIGIT = """
+def half_unit(printed):
+    number, _, exponent = printed.replace(",", ".").partition("e")
+    if "." in number:
+        decimals = len(number.split(".")[1])
+    else:
+        decimals = -(len(number.lstrip("-")) - 1)
+    return 0.5 * 10.0 ** (int(exponent or 0) - decimals)
+"""
+FORWARD = """
+def bound(f, printed):
+    x, h = read(printed)
+    return np.abs([(f(x + 1e-7 * e) - f(x)) / 1e-7 for e in np.eye(len(x))]) @ h
+"""
 LETTERS_OF_THE_FLOAT = """
 def half_unit(printed):
     return 0.5 / 10 ** len(str(float(printed.replace(",", "."))).split(".")[1])
@@ -452,6 +467,8 @@ def between_axes(T, apart):
         (ledger, "half_unit", THROUGH_FLOAT, "float() forgets"),
         (ledger, "half_unit", LETTERS_OF_THE_FLOAT, "float() forgets"),
         (ledger, "half_unit", OF_THE_FLOAT, "too small on every draw"),
+        (ledger, "half_unit", OF_ITS_FIRST_DIGIT, "wrong exactly where `printed` has no decimals"),
+        (ledger, "bound", FORWARD, "slope times the half unit"),
         (own, "left_out", ONE_SHARE, "the largest share for all"),
         (own, "with_one_more", SHRINKING, "(I - K J) C"),
         (own, "with_one_more", JOSEPH, "minus stands where plus belongs"),

@@ -1329,6 +1329,10 @@ CHAPTER = Chapter(
                     lambda x0, v, z, s: (np.mean([x0, *z]), fuse_two_sensors(x0, v, z, s)[1]),
                     "The variance is right. The position is no plain mean: the weights 1 / variance belong to it, too.",
                 ),
+                Mistake(
+                    _fused(lambda v, s: [1 / v, *(s == s.min()) / s**2]),
+                    "Of the sensors the better one alone counts in yours. The other is an opinion as well, if a weaker one.",
+                ),
                 Mistake(_fused(lambda v, s: [1 / v, 1 / s[0] ** 2, 0]), "The second sensor is missing."),
                 Mistake(_fused(lambda v, s: [1 / v, 0, 1 / s[1] ** 2]), "The first sensor is missing."),
                 Mistake(_fused(lambda v, s: [1 / v, *(1 / s**4)]), "You squared the standard deviations twice."),

@@ -724,6 +724,10 @@ CHAPTER = Chapter(
                     "You counted the decimals. With d of them half a unit is 0.5 * 10**-d.",
                 ),
                 Mistake(
+                    lambda printed: 10 * half_unit(printed),
+                    "That is five units of the last digit: with d decimals half a unit is 0.5 * 10**-d.",
+                ),
+                Mistake(
                     lambda printed: half_unit(printed) / 10,
                     "One decimal too many: with d decimals half a unit is 0.5 * 10**-d.",
                 ),

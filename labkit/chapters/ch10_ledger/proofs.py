@@ -162,6 +162,11 @@ def _by_derivative(step):
     )
 
 
+def _by_forward_differences(step):
+    """The same by differences from the value up."""
+    return lambda f, printed: np.abs(_moves(f, printed, lambda text: step)[0]) / step @ read(printed)[1]
+
+
 def _signs_left(f, printed):
     up, down = _moves(f, printed)
     return np.maximum(up, down).sum()
@@ -336,6 +341,15 @@ BOUND = Exercise(
                 id=f"bound-1fcd90{which}",
             )
             for step, which in ((1e-6, ""), (1e-5, "-2"), (1e-4, "-3"), (1e-7, "-4"), (1e-8, "-5"))
+        ),
+        *(
+            Mistake(
+                _by_forward_differences(step),
+                "That is the slope times the half unit. Where f is curved the move itself is another: go the half "
+                "unit up and down.",
+                id=f"bound-1fcd90{which}",
+            )
+            for step, which in ((1e-6, "-6"), (1e-7, "-7"), (1e-8, "-8"))
         ),
         Mistake(
             _relative_moves,
@@ -747,6 +761,12 @@ def _average_at_last(entries, average):
     return found - {len(entries)} or found
 
 
+def _average_before(entries, average):
+    """The entries are suspected where the average is not."""
+    found = suspects(entries, average)
+    return {len(entries)} & found or found
+
+
 def _left_out_agrees(entries, average, otherwise):
     """Those without whom the others agree with the average as far as all would have to; or `otherwise`."""
     if _agree(entries, average):
@@ -921,9 +941,13 @@ SUSPECTS = Exercise(
             _search(places=lambda n: range(n)),
             "The average was printed too, and can carry the slip: try it as well, as the last position.",
         ),
-        Mistake(
-            _search(agree=_allow(lambda halves, own: 0.0)),
-            "All numbers were rounded: agreement to the last bit is too much to ask. Allow what their half units hide.",
+        *(
+            Mistake(
+                _search(agree=_allow(lambda halves, own: 0.0), first_agree=first),
+                "All numbers were rounded: agreement to the last bit is too much to ask. Allow what their half units "
+                "hide.",
+            )
+            for first in (None, _agree)
         ),
         *(
             Mistake(
@@ -964,6 +988,11 @@ SUSPECTS = Exercise(
             _average_at_last,
             "You suspect the average only where no entry can be it. Both may explain the gap: try all, and name all.",
         ),
+        Mistake(
+            _average_before,
+            "You suspect the entries only where the average cannot be it. Both may explain the gap: try all, and name "
+            "all.",
+        ),
         *(
             Mistake(
                 functools.partial(_left_out_agrees, otherwise=otherwise),
@@ -972,13 +1001,20 @@ SUSPECTS = Exercise(
             )
             for otherwise in (True, False)
         ),
-        Mistake(
-            _search(agree=_allow(lambda halves, own: own)),
-            "The entries were rounded as well: their half units, divided by how many there are, add to the average's.",
+        *(
+            Mistake(
+                _search(agree=_allow(lambda halves, own: own), first_agree=first),
+                "The entries were rounded as well: their half units, divided by how many there are, add to the "
+                "average's.",
+            )
+            for first in (None, _agree)
         ),
-        Mistake(
-            _search(agree=_allow(lambda halves, own: _mean(halves))),
-            "The average was rounded as well: its half unit adds to the mean of the entries'.",
+        *(
+            Mistake(
+                _search(agree=_allow(lambda halves, own: _mean(halves)), first_agree=first),
+                "The average was rounded as well: its half unit adds to the mean of the entries'.",
+            )
+            for first in (None, _agree)
         ),
         Mistake(
             _search(agree=_allow(lambda halves, own: 2 * (_mean(halves) + own))),
