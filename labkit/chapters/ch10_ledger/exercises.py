@@ -403,15 +403,16 @@ STATUSES = (
     ),
     *(
         (
-            _half_of_all(half),
-            "Your half unit is the same for all numbers. It follows from the digits that are printed: half_unit(printed).",
+            variant,
+            "What is allowed for the half unit does not follow from the digits that are printed: half_unit(printed).",
+            f"status-3e881c{number}",
         )
-        for half in (0.005, 0.05, 0.5, 0.0005)
+        for variant, number in zip(map(_half_of_all, (0.005, 0.05, 0.5, 0.0005)), ("", "-2", "-3", "-4"))
     ),
     *(
         (
             _half_of_the_number(share),
-            "This allows a share of the printed number in place of its half unit. How much is hidden follows from the digits: half_unit(printed).",
+            "What is allowed for the half unit does not follow from the digits that are printed: half_unit(printed).",
         )
         for share in (0.005, 0.01, 0.05, 0.001)
     ),
