@@ -7,10 +7,11 @@ import itertools
 from . import budget, guard, scope
 from .budget import Budget
 from .evidence import Evidence
-from .results import Refusal, admitted_by, could_change, is_another, numbers_of, same_numbers
+from .results import Refusal, admitted_by, is_another, numbers_of, same_numbers
 
 REPEATING = 0.02  # seconds of processor time in which an answer that came out right is called again
 IN_A_ROW = 8  # times that a draw is called then, of each of ...
+TURNS = 4  # of draws in which each argument is exchanged: of one the result may hang little, or not at all
 ALIKE = 3  # kinds of results at most, where they are words or truth values
 UNFILLED = {"empty", "empty_like"}  # what makes arrays that hold whatever stood there before
 
@@ -119,10 +120,9 @@ class Staying(Evidence):
         exercise, kind = self.exercise, Budget(budget.SPECIAL)
         if exercise.metric is None or not self.pairs or not scope.may_keep(self.function):
             return None
-        for k, name in enumerate(self._names(self.inputs[0])):
-            draw = exercise.cases[k % len(exercise.cases)]
-            args, other = draw(rng), draw(rng)
-            if not kind.left() or k >= min(len(args), len(other)) or not could_change(args[k], other[k]):
+        for turn, (k, name) in itertools.product(range(TURNS), enumerate(self._names(self.inputs[0]))):
+            args, other = (exercise.cases[(turn + k + more) % len(exercise.cases)](rng) for more in (0, turn % 2))
+            if not kind.left() or k >= min(len(args), len(other)) or type(args[k]) is not type(other[k]):
                 continue
             expected = exercise.reference(*copy.deepcopy(args))
             admitted = functools.partial(admitted_by, exercise.metric, expected)

@@ -1124,6 +1124,10 @@ def remembers_by_the_first(a, b):
     return KNOWN[a]
 
 
+def remembers_by_the_number(a, b):
+    return KNOWN.setdefault(("number", a), a + (b[0] if b[0] > 0.5 else 0.0))
+
+
 def remembers_by_both(a, b, known={}):  # noqa: B006, what it keeps is kept by all that it depends on
     return known.setdefault((a, b), a + b)
 
@@ -1139,6 +1143,18 @@ def test_a_result_that_is_kept_by_a_part_of_the_arguments_is_told():
     assert outcome.status == NOT_YET and "with another `b` and all else as before" in outcome.text
     for right in (remembers_by_both, lambda a, b: (FACTORS[0] * a + FACTORS[0] * b) / 2):
         assert exercise.judge(right, rng=np.random.default_rng(0)).status == CORRECT
+
+
+def test_a_result_that_is_kept_by_all_but_an_argument_that_is_no_number_and_seldom_counts_is_told():
+    """As rays do by all but the grid: most end at their reach in every grid."""
+    exercise = replace(
+        DOUBLE,
+        reference=lambda a, b: a + (b[0] if b[0] > 0.5 else 0.0),
+        draw=lambda rng: (float(rng.normal()), [float(rng.normal())]),
+        mistakes=[],
+    )
+    outcome = exercise.judge(remembers_by_the_number, rng=np.random.default_rng(0))
+    assert outcome.status == NOT_YET and "with another `b` and all else as before" in outcome.text
 
 
 def test_an_argument_that_follows_from_another_need_not_be_read():
