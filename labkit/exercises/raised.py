@@ -39,7 +39,7 @@ ADVICE = {  # what NumPy means, by a regular expression
     "float' object has no attribute": "Here stands a single number, and no array.",
     "float64' object has no attribute": "Here stands a single number, and no array.",
     "float' object is not subscriptable": "Brackets take an entry out of several: here stands a single number.",
-    "remapped shapes": "In `einsum` one letter has one length: here a letter stands for two.",
+    "remapped shapes": "`@` takes as many matrices on either side, or one; one letter of `einsum` has one length.",
     "could not be broadcast": "Entry by entry these shapes do not fit: is `@` meant, is a sum over an axis missing?",
 }
 

@@ -264,7 +264,7 @@ def _arrangement(results, holds):
             return "your matrix is the inverse of the expected one"
     oblong = all(r.ndim == 2 and 1 < r.shape[0] != r.shape[1] > 1 for r in results)
     if oblong and holds(lambda r: r.reshape(r.shape[::-1]).T):
-        return "the numbers are right, but stand row by row where they belong column by column: `.T`, no `reshape`"
+        return "the numbers are right, in the order of columns written as rows: is a `reshape` taken for `.T`?"
     if not first.ndim or first.shape[-1] < 2 or any(r.shape[-1:] != first.shape[-1:] for r in results):
         return None
     if first.ndim == 1 and first.size > 2 and holds(lambda r: r[::-1]):

@@ -847,7 +847,7 @@ class Search:
         line, code, *_ = self.written.places[units[len(known)]]
         if line in self.written.walked and not solution.repeats:
             return told
-        return f"{told}; `{code}` in line {line} is none of them, by a slip up to there or since you go another way"
+        return f"{told}; `{code}` in line {line} is none of them, by a slip or since you go another way"
 
     def _units(self, solution):
         """Places of the steps as a whole, in their order: variables that are bound, and what is part of no other."""

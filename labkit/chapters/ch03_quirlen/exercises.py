@@ -546,7 +546,7 @@ CHAPTER = Chapter(
                 Mistake(lambda: _kreisel().tip[2], "This is the z component alone: the tip also sits to the side."),
                 Mistake(
                     lambda: np.abs(_kreisel().tip).sum(),
-                    "This is a sum of components. The length is the root of the sum of squares.",
+                    "This is the sum of the components' absolute values. The length is the root of the sum of squares.",
                     id="tip_length-b16803",
                 ),
                 Mistake(

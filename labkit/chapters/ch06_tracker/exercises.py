@@ -1579,7 +1579,7 @@ CHAPTER = Chapter(
                 (
                     all_equal,
                     KeptOrNot(),
-                    "Right as long as the values differ. Where all are equal, each lies at the median, at a distance of 0, and 0 is within a limit of 0:",
+                    "Right as long as no two values are equal. Where all are, each lies at the median, at a distance of 0, and 0 is within a limit of 0:",
                 ),
                 (
                     lopsided,

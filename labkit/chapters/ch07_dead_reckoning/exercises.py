@@ -2011,7 +2011,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _offset(lambda d, turn, way: way * turn / 2),
-                    "Right to first order. Over a long way the arc bends, and the middle goes farther than counted: use the circle.",
+                    "Right to first order. Over a long way the arc bends, and the middle does not go the way that was counted: use the circle.",
+                    "wheel_offset-d23ac4",
                 ),
                 Mistake(
                     _offset(lambda d, turn, way: d * np.sin(turn / 2)),

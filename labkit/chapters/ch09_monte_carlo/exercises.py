@@ -1955,7 +1955,7 @@ def _hunt(id, reference, specimen, why, hints, others, good=GOOD, extra=("rng",)
         mistakes=[
             Mistake(
                 lambda *_: True,
-                f"Your test says True of the specimen, which means correct (if you meant it to say caught: that is False). {why}",
+                f"Your test said True of the specimen, which means correct (if you meant it to say caught: that is False). {why}",
                 id=named,
             ),
             Mistake(lambda *_: None, "Your test returned None: it has to return True (passed) or False (caught)."),
@@ -3043,11 +3043,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a, w: float(planar.wrap_angle(w @ np.unwrap(a) / w.sum())),
-                    "Unrolled angles have an arithmetic mean, which is near, but it is not the direction of the mean vector: average cosines and sines.",
+                    "Unrolled angles have an arithmetic mean, which is near where they are close together, but it is not the direction of the mean vector: average cosines and sines.",
+                    id="circular_mean-394601",
                 ),
                 Mistake(
                     lambda a, w: float(planar.wrap_angle(a[0] + w @ planar.wrap_angle(a - a[0]) / w.sum())),
-                    "Unrolled angles have an arithmetic mean, which is near, but it is not the direction of the mean vector: average cosines and sines.",
+                    "Unrolled angles have an arithmetic mean, which is near where they are close together, but it is not the direction of the mean vector: average cosines and sines.",
+                    id="circular_mean-394601-2",
                 ),
                 Mistake(
                     lambda a, w: math.degrees(particles.circular_mean(np.radians(a), w)),
@@ -3370,6 +3372,7 @@ CHAPTER = Chapter(
                 "return np.abs(np.bincount(index, minlength=4) / len(index) - w).max() < 0.05`",
             ),
             others=(SQUARED, UNIFORM, TO_THE_MIDDLE, LAST_ALONE, HEAVIEST_ALONE, SORTED),
+            named="hunt_1-372f30",
         ),
         _hunt(
             "hunt_2",
@@ -3389,6 +3392,7 @@ CHAPTER = Chapter(
                 (_lightest_left_out, "never draws the lightest ones"),
                 (_specimen_2_of_many, "has the same defect, but among more than six particles only"),
             ),
+            named="hunt_2-3cc571",
         ),
         _hunt(
             "hunt_3",
@@ -3427,6 +3431,7 @@ CHAPTER = Chapter(
             ),
             good=(_weights_multiplied, _weights_not_normalized),
             extra=(),
+            named="hunt_4-c568a6",
         ),
     ],
     further=("landmark_weight", "multiply_weights", "scan_from_depth", "hunt_1", "hunt_2", "hunt_3", "hunt_4"),
