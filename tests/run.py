@@ -93,14 +93,14 @@ def scratch_folder():
 
 
 def all_jobs(scratch):
-    """{name: arguments of pytest}, the longest first; stirred ones take longer than others."""
+    """{name: arguments of pytest}, the longest first."""
     tests = (path for path in (ROOT / "tests").glob("**/test_*.py") if path.parent.name not in APART)
     units = sorted(str(path) for path in tests if path != LONGEST)
     solved = sorted(str(path) for path in (ROOT / "solutions").glob("[0-9][0-9]_*.ipynb"))
     jobs = {
         **{name: [str(ROOT / "tests" / name)] for name in APART},
         "unit tests 0": [str(LONGEST)],
-        **{f"unit tests {k}": units[k - 1 :: UNITS] for k in sorted(range(1, UNITS + 1), key=lambda k: k % 2)},
+        **{f"unit tests {k}": units[k - 1 :: UNITS] for k in range(1, UNITS + 1)},
         "solved notebooks 1": ["--nbval", *BARE, *solved[0::2]],
         "solved notebooks 2": ["--nbval", *BARE, *solved[1::2]],
     }

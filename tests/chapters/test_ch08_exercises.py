@@ -475,7 +475,7 @@ def in_degrees_and_half_of_what_is_large(x0, cov0, z, C, cov_z):
         (
             "measurement_jacobian",
             lambda x, landmark: ch08.measurement_jacobian(x, landmark).T.reshape(2, 3),
-            "row by row where they belong column by column",
+            "in the order of columns written as rows",
         ),
         ("gate", lambda y, S, limit: bool((y**2 < limit * np.diag(S)).all()), "Each number is judged by itself"),
         ("wrap_angle", lambda a: np.fmod(a + np.pi, 2 * np.pi) - np.pi, "An angle below -pi ends below -pi"),
