@@ -108,8 +108,7 @@ class Border:
             self.read[function] = rerun.written(self.ours[function])
         written, began = self.read[function], time.thread_time()
         if what == "read":
-            facts = {name: getattr(written, name, None) for name in rerun.Written.READ}
-            found = written and (written.changes, written.places, facts)
+            found = written and (written.changes, written.places, written.facts)
         elif what == "trace":
             found = written.trace(args, seconds), written.of_truth
         elif what == "truths":

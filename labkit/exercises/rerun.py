@@ -169,7 +169,7 @@ class Written:
     of_truth: numbers of the places where a truth value, or an array of them, was met in a trace.
     """
 
-    READ = ("lines", "of_notebook", "iterated", "searched", "walked", "repeats")  # what is known without a trace
+    FACTS = ("lines", "of_notebook", "iterated", "searched", "walked", "repeats")
 
     def __init__(self, function, tree, lines=None, beside=()):
         self.function, self.beside, self.lines = function, [helper for helper, _ in beside], lines or {}
@@ -178,6 +178,11 @@ class Written:
         self._noted, self.places = _noted(function, self.trees, self.lines)
         for tree in self.trees:
             _ticking(tree)
+
+    @property
+    def facts(self):
+        """{name: value} of what is known without a trace: another process asks for it."""
+        return {name: getattr(self, name) for name in self.FACTS}
 
     @functools.cached_property
     def of_notebook(self):
