@@ -29,7 +29,7 @@ def own_progress(progress_files, monkeypatch):
 @pytest.fixture(autouse=True)
 def looks_for_explanations_to_the_end(monkeypatch):
     """Else a slow processor would leave wrong answers unexplained that a fast one explains."""
-    monkeypatch.setattr(budget, "LOOKING", 30.0)
+    monkeypatch.setattr(budget, "LOOKING", 12.0)
 
 
 @pytest.fixture(autouse=True)

@@ -81,20 +81,25 @@ class Explanations(Named):
         """The words of the first of (words, function) that gives the student's results, on fresh draws as well; None
         if none does in time.
         """
-        draws, kind, variants = self._cases(), self.budget.part(), iter(variants)
-        while kind.left():
-            fits = None
-            try:
-                with guard.time_limit(kind.left()):  # a variant may well have a loop without an end
-                    for words, function in variants:
-                        if all(self._is_mistake(Mistake(function, words), *case) for case in draws):
-                            fits = words, function
-                            break
-            except guard.TimeLimit:
+        draws, kind = self._cases(), self.budget.part()
+        for words, function in variants:
+            if not kind.left():
                 return None
-            if fits is None or self._fits_more(fits[1]):
-                return fits and fits[0]
+            mistake = Mistake(function, words)
+            if self._fits_within(kind.part().left(), mistake, draws[:1]) and self._fits_within(
+                kind.left(), mistake, draws[1:]
+            ):
+                if self._fits_more(function):
+                    return words
         return None
+
+    def _fits_within(self, seconds, mistake, draws):
+        """Whether a variant gives the student's results in so many seconds: it may well have a loop without an end."""
+        try:
+            with guard.time_limit(seconds):
+                return all(self._is_mistake(mistake, *draw) for draw in draws)
+        except guard.TimeLimit:
+            return False
 
     def _fits_more(self, function):
         """Whether a variant gives the student's results on fresh draws as well."""

@@ -219,17 +219,20 @@ class Search:
 
     def mending(self, plans, values=None):
         """The first plan that makes the result right on all draws; None where none does in time."""
-        kind = self.budget.part()
-        for start in range(0, len(plans), BATCH):
-            batch = plans[start : start + BATCH]
-            fits = self._fitting(batch, 0, kind, values)
-            for plan in [plan for plan, fit in zip(batch, fits) if fit]:
-                others = (self._fitting([plan], i, self.budget, values) for i in range(1, len(self.cases)))
-                if all(fit == [True] for fit in others) and self._is_answer(plan):
-                    return plan
-            if not kind.left() or len(fits) < len(batch):
-                return None
+        tried = self._tried(plans, lambda batch, time: self._fitting(batch, 0, time, values))
+        for plan in (plan for plan, fit in tried if fit):
+            others = (self._fitting([plan], i, self.budget, values) for i in range(1, len(self.cases)))
+            if all(fit == [True] for fit in others) and self._is_answer(plan):
+                return plan
         return None
+
+    def _tried(self, plans, results):
+        """(plan, what comes of it) one after the other, by `results(plans, budget)`, for as long as there is time."""
+        kind, first = self.budget.part(), 0
+        while first < len(plans) and kind.left():
+            found = results(plans[first : first + BATCH], kind.part())
+            yield from zip(plans[first:], found)
+            first += max(1, len(found))  # one that takes all the time alone may have a loop without an end
 
     def _is_answer(self, plan):
         """Whether the function with this change would be taken as an answer, as far as fresh draws tell."""
@@ -518,17 +521,12 @@ class Search:
     def partly_words(self):
         """A change of the code that leaves a simple difference, or makes a part of the result right on all draws."""
         plans = [("code", k) for k, (rank, *_) in enumerate(self.written.changes) if 0 <= rank < WORTH]
-        kind, best = self.budget.part(), None
-        right = [case.parts_before() for case in self.cases]
+        best, right = None, [case.parts_before() for case in self.cases]
         if None in right:
             return None
-        for start in range(0, len(plans), BATCH):
-            batch = plans[start : start + BATCH]
-            for plan, better in zip(batch, self._gains(batch, right[0], kind)):
-                if better and (words := self._partly(plan, right)) and (best is None or better > best[0]):
-                    best = better, plan, words
-            if not kind.left():
-                break
+        for plan, better in self._tried(plans, lambda batch, time: self._gains(batch, right[0], time)):
+            if better and (words := self._partly(plan, right)) and (best is None or better > best[0]):
+                best = better, plan, words
         if best is None:
             return None
         _, line, code, mends = self.written.changes[best[1][1]]
@@ -553,10 +551,10 @@ class Search:
                 return f"in line {line}, `{code}`: {words.format(found[1], COMES_NEARER)}"
         return None
 
-    def _gains(self, plans, right, kind):
+    def _gains(self, plans, right, budget):
         """How much better each plan makes the result of the first draw."""
         case = self.cases[0]
-        return self.written.results(plans, case.args, kind.left(), lambda found: case.gain(found, right))
+        return self.written.results(plans, case.args, budget.left(), lambda found: case.gain(found, right))
 
     def _partly(self, plan, right):
         """What comes right on all draws by a change that does not make all right, in words."""

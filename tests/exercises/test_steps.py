@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from labkit.chapters.ch04_optimization.exercises import CHAPTER as OPTIMIZATION
-from labkit.exercises import guard, metrics, mutation, rerun, session, steps
+from labkit.exercises import budget, guard, metrics, mutation, rerun, session, steps
 from labkit.exercises.budget import Budget
 from labkit.exercises.engine import Exercise
 from labkit.exercises.outcome import CORRECT, NOT_YET
@@ -58,6 +58,20 @@ for k in range(n):
     total += r[k] ** 2
 return n * np.sqrt(total)
 """
+
+
+SUMMED_IN_A_QUEUE = """
+x = a / np.linalg.norm(a)
+row = [v ** 3 for v in b - (b @ x) * x]
+while len(row) > 1:
+    row = row[2:] + [row[0] + row[1]]
+return len(b) * np.sqrt(row[0])
+"""
+
+
+def test_a_change_without_an_end_costs_its_share_and_hides_no_other(monkeypatch):
+    monkeypatch.setattr(budget, "LOOKING", 3.0)
+    assert "In line 3, `3`: 3 stands where 2 belongs. With this alone changed" in told(SUMMED_IN_A_QUEUE)
 
 
 def test_what_is_right_stays_right():
