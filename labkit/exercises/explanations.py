@@ -86,11 +86,9 @@ class Explanations(Named):
             if not kind.left():
                 return None
             mistake = Mistake(function, words)
-            if self._fits_within(kind.part().left(), mistake, draws[:1]) and self._fits_within(
-                kind.left(), mistake, draws[1:]
-            ):
-                if self._fits_more(function):
-                    return words
+            begun = self._fits_within(kind.part().left(), mistake, draws[:1])
+            if begun and self._fits_within(kind.left(), mistake, draws[1:]) and self._fits_more(function):
+                return words
         return None
 
     def _fits_within(self, seconds, mistake, draws):
