@@ -466,7 +466,7 @@ def in_degrees_and_half_of_what_is_large(x0, cov0, z, C, cov_z):
     [
         ("measurement_jacobian", differences_across_the_seam, "wrapped"),
         ("measurement_jacobian", of_the_poses_own_kind, "`dtype=` does not belong there"),
-        ("steady_state_gain", noise_at_the_start_only, "Your gain dies out"),
+        ("steady_state_gain", noise_at_the_start_only, "cov_v comes in at the start only"),
         ("steady_state_gain", divides_by_the_diagonal, "the diagonal of S alone"),
         ("fuse_two_sensors", first_gain_twice, "The second sensor gets the gain of the first"),
         ("batch_estimate", rows_repeated, "np.tile"),

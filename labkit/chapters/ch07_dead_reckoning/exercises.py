@@ -623,7 +623,7 @@ def _not_straight(function, x, u, dt, expected):
     if result.shape != (3,):
         return f"right on curves, but {given} it returns an array of shape {result.shape}. A pose has shape (3,)."
     if not np.isfinite(result).all():
-        return f"right on curves, but {given} the result is not finite: the radius v / omega has no value there."
+        return f"right on curves, but {given} the result is not finite: is something divided by omega, or by half the turn?"
     if metrics.PlanarPoses(1e-6).equal(result, expected):
         return None
     if u[1] == ROUNDED_WHEELS:
@@ -811,7 +811,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda L, d, p: np.linalg.norm(L - p) ** 2 - d**2,
-                    "Without axis=1 the sum (or the norm) runs over all landmarks at once: one sum a row is wanted.",
+                    "Your sum of squares runs over all landmarks at once, as it does without axis=1: one sum a landmark is wanted.",
+                    id="lateration_residual-4a1dc4",
                 ),
                 Mistake(
                     lambda L, d, p: d**2 - ((L - p) ** 2).sum(1),
@@ -843,7 +844,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda L, d, p: ((L[0] - p) ** 2).sum() - d[0] ** 2,
-                    "Only the first landmark: does `return` stand inside the loop?",
+                    "Only the first landmark: does a `return` stand inside a loop?",
+                    id="lateration_residual-7eff7e",
                 ),
             ],
         ),
@@ -920,7 +922,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _newton(lambda J, f, d: (J, f + d**2 - d)),
-                    "Newton works, on the wrong equations: the measured distances are not squared.",
+                    "These are Newton's steps for other equations: the measured distances are not squared.",
+                    id="newton_lateration-d480e8",
                 ),
                 Mistake(
                     _newton(lambda J, f, d: (J, np.sqrt(f + d**2) - d)),
@@ -973,7 +976,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda L, d, s: np.full(2, np.nan),
-                    "No number comes out: the search runs off to infinity, or something is divided by zero. The step must solve J step = -f, with J = 2 (position - landmarks) at the present position.",
+                    "No number comes out: does the search run off to infinity, is something divided by zero, or a root taken of what is negative? The step must solve J step = -f, with J = 2 (position - landmarks) at the present position.",
                     id="newton_lateration-552b1c",
                 ),
             ],
@@ -1029,7 +1032,8 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     lambda a, b, l: np.array([(a + b) / 2, (a - b) / l]),
-                    "Your robot turns the wrong way: when the right wheel is faster it turns left, counterclockwise, omega > 0.",
+                    "Your robot turns the wrong way: with v_right > v_left it turns left, counterclockwise, omega > 0.",
+                    id="wheel_to_twist-862695",
                 ),
                 Mistake(
                     lambda a, b, l: np.array([a + b, (b - a) / l]),
@@ -1084,7 +1088,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a, b, l: np.array([a + b, (a - b) / l]),
-                    "Two slips: v is half the sum, and omega is positive when the right wheel is faster.",
+                    "Two slips: v is half the sum, and omega is positive where v_right > v_left.",
+                    id="wheel_to_twist-259431",
                 ),
             ],
         ),
@@ -1162,7 +1167,9 @@ CHAPTER = Chapter(
                     "The half turn has the wrong sign: the robot looks ahead into the curve.",
                 ),
                 Mistake(
-                    _straight(_way, _mean, _turn), "A bracket too many: theta + omega T / 2, not (theta + omega T) / 2."
+                    _straight(_way, _mean, _turn),
+                    "You halve theta as well: the direction is theta + omega T / 2, not (theta + omega T) / 2.",
+                    id="step_midpoint-3e15da",
                 ),
                 Mistake(
                     _between_wrapped_headings,
@@ -1174,11 +1181,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda x, u, dt: step_euler(step_euler(x, u, dt / 2), u, dt / 2),
-                    "These are two steps of the simplified model, each of half the time. The midpoint model takes one, along the heading of half the turn.",
+                    "This is where two steps of the simplified model end, each of half the time. The midpoint model takes one, along the heading of half the turn.",
+                    id="step_midpoint-42d4c5",
                 ),
                 Mistake(
                     _straight(_way, _beyond, _turn),
-                    "The heading was turned before it was used: keep the old theta for cosine and sine.",
+                    "Your direction is theta + 3 omega T / 2: is the heading turned before cosine and sine use it? To the old theta half of the turn is added.",
+                    id="step_midpoint-950064",
                 ),
                 *_slips(_way, _half, "theta + omega T / 2"),
             ],
@@ -1234,10 +1243,15 @@ CHAPTER = Chapter(
                     _straight(_chord, _old, _turn),
                     "The length of the chord is right. It points along theta + h, halfway through the turn; yours along the old heading.",
                 ),
-                Mistake(_arc_sign, "Your robot drives its circle backward: check the signs at the center of rotation."),
+                Mistake(
+                    _arc_sign,
+                    "Your robot drives the other way: x and y change by the right amounts, with the wrong signs. The center of rotation lies at x - r sin(theta), y + r cos(theta), with r = v / omega.",
+                    id="step_arc-e5a54e",
+                ),
                 Mistake(
                     _arc_y_sign,
-                    "x is right, y has the wrong sign: the center lies to the left of the heading for omega > 0.",
+                    "x is right; y changes by the right amount with the wrong sign. The center of rotation lies at y + r cos(theta), with r = v / omega.",
+                    id="step_arc-f3baa0",
                 ),
                 Mistake(
                     _straight(_chord, _before, _turn),
@@ -1245,11 +1259,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _straight(_chord, _mean, _turn),
-                    "A bracket too many: theta + omega T / 2, not (theta + omega T) / 2.",
+                    "You halve theta as well: the direction is theta + omega T / 2, not (theta + omega T) / 2.",
+                    id="step_arc-3e15da",
                 ),
                 Mistake(
                     _straight(_chord, _beyond, _turn),
-                    "The heading was turned before it was used: keep the old theta for cosine and sine.",
+                    "Your direction is theta + 3 omega T / 2: is the heading turned before cosine and sine use it? To the old theta half of the turn is added.",
+                    id="step_arc-950064",
                 ),
                 Mistake(
                     _straight(_chord, lambda th, v, w, dt: th + w / 2, _turn),
@@ -1269,7 +1285,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _arc_from(lambda v, w: v / abs(w)),
-                    "No absolute value: for a turn to the right the radius is negative, the center lies on the right.",
+                    "No absolute value: r = v / omega changes its sign with omega, and the center of rotation its side.",
+                    id="step_arc-e83ed8",
                 ),
                 Mistake(
                     _arc_from(lambda v, w: w / v),
@@ -1281,7 +1298,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda x, u, dt: step_arc(x, u, dt) * [-1, 1, 1] + 2 * x * [1, 0, 0],
-                    "y is right, x has the wrong sign: the center lies to the left of the heading for omega > 0.",
+                    "y is right; x changes by the right amount with the wrong sign. The center of rotation lies at x - r sin(theta), with r = v / omega.",
+                    id="step_arc-039c64",
                 ),
                 *(
                     Mistake(
@@ -1569,7 +1587,8 @@ CHAPTER = Chapter(
                     _covariance(
                         lambda v, w, t, a, b, c: a * abs(v) * t, lambda v, w, t, a, b, c: (b * abs(w) + c * abs(v)) * t
                     ),
-                    "You multiplied by T. The variance of the way is k_d v T; the speed is that way divided by T, so its variance by T squared.",
+                    "You multiplied by T. The variance of the way is k_d |v| T; the speed is that way divided by T, so its variance by T squared.",
+                    id="control_covariance-ab70e0",
                 ),
                 Mistake(
                     _covariance(lambda v, w, t, a, b, c: a * abs(v) / t, lambda v, w, t, a, b, c: b * abs(w) / t),
@@ -2035,7 +2054,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _offset(lambda d, turn, way: d / turn * (1 - np.cos(way * turn / d))),
-                    "The radius is right. The middle goes farther round it than was counted: it turns by way (1 + excess / 2) / radius.",
+                    "The radius is right. The middle does not go the way that was counted: it turns by way (1 + excess / 2) / radius.",
+                    id="wheel_offset-3771a4",
                 ),
                 Mistake(
                     lambda way, excess, track: wheel_offset(way, excess, track) * (1 + excess) / (1 + excess / 2),
@@ -2047,7 +2067,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _offset(lambda d, turn, way: 2 * d / turn * np.sin(turn / 2)),
-                    "This is the length of the chord, how far away it ends. Asked is how far to the left: times the sine of half the turn.",
+                    "This is the chord, 2 r sin(h) with h half the turn. Asked is how far to the left: times sin(h).",
+                    id="wheel_offset-1c6a82",
                 ),
                 *(
                     Mistake(
@@ -2062,7 +2083,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda way, excess, track: -wheel_offset(way, excess, track),
-                    "The larger right wheel goes farther, so the robot turns to the left: the sign.",
+                    "The sign: a larger right wheel goes farther and turns the robot to the left, a smaller one to the right.",
+                    id="wheel_offset-b7b78f",
                 ),
                 Mistake(
                     lambda way, excess, track: wheel_offset(way, 2 * excess, track) * (1 + excess / 2) / (1 + excess),
@@ -2238,7 +2260,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _mecanum(lever=lambda a, b: 2 * (a + b)),
-                    "Half length and half width are given: do not double them.",
+                    "omega is half as large as it should be: the lever is half length plus half width, not twice that, and the wheels are four.",
+                    id="mecanum_twist-137736",
                 ),
                 Mistake(
                     _mecanum(lever=lambda a, b: 1.0),

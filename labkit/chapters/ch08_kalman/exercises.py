@@ -918,7 +918,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: P + B @ Q @ B.T),
-                    "The old covariance must be carried along by A: a velocity error becomes a position error.",
+                    "The old covariance must be carried along by A, as the state is: A cov A^T.",
+                    id="predict_state-1d98b0",
                 ),
                 Mistake(
                     _predicted(_moved, lambda P, A, B, Q: A * P * A.T + B @ Q @ B.T),
@@ -947,7 +948,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _predicted(lambda x, A, B, u: x + B @ u, _grown),
-                    "The state must be carried along by A: the velocity moves the position.",
+                    "The old state is added as it is. It must be carried along by A: A x + B u.",
+                    id="predict_state-5060be",
                 ),
                 Mistake(_predicted(lambda x, A, B, u: B @ u, _grown), "The old state is missing: add A x."),
                 Mistake(
@@ -1376,7 +1378,9 @@ CHAPTER = Chapter(
                     "0.25 is the first sensor's variance already; its standard deviation is 0.5.",
                 ),
                 Mistake(
-                    lambda: 10.0, "The mean of both sensors. But the first one is four times as certain in variance."
+                    lambda: 10.0,
+                    "This is the plain mean of both sensors, and the true position. Asked is the weighted mean: one over the variance is 4 and 1, and 1/20 for the prior.",
+                    id="fused-ef4d72",
                 ),
                 Mistake(
                     lambda: _fusion(std1=np.sqrt(0.5), std2=1.0),
@@ -1534,7 +1538,7 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         _rounds(n, noise=0),
-                        "Your gain dies out: cov_v is missing within the loop. The system adds its noise anew with every step.",
+                        "Here cov_v comes in at the start only, or not at all. The system adds its noise anew with every step: add it within the loop.",
                         id=id,
                     )
                     for n, id in ((1000, "steady_state_gain-08a959"), (3000, "steady_state_gain-08a959-2"))
@@ -1718,7 +1722,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a: (a + np.pi) % (2 * np.pi),
-                    "The second shift is missing: subtract pi again.",
+                    "Your angles lie between 0 and 2 pi, each the right one plus pi: is the second shift missing? Subtract pi.",
+                    id="wrap_angle-8d9df2",
                 ),
                 Mistake(
                     lambda a: (a + 180) % 360 - 180,
@@ -1826,7 +1831,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda x, l: np.array([measurement(x, l)[0], np.arctan(np.divide(*(l - x[:2])[::-1])) - x[2]]),
-                    "The arctangent of dy / dx cannot tell left from right of the y axis: np.arctan2(dy, dx) can. And the bearing has to be wrapped.",
+                    "The arctangent of dy / dx is the same for (dx, dy) and (-dx, -dy): np.arctan2(dy, dx) tells them apart. And the bearing has to be wrapped.",
                     id="measurement-62b89b",
                 ),
                 *(
@@ -1847,7 +1852,7 @@ CHAPTER = Chapter(
                     lambda x, l: np.array(
                         [measurement(x, l)[0], wrapped(np.arctan(np.divide(*(l - x[:2])[::-1])) - x[2])]
                     ),
-                    "The arctangent of dy / dx cannot tell a landmark on the left from one on the right of the y axis: np.arctan2(dy, dx) can.",
+                    "The arctangent of dy / dx is the same for (dx, dy) and (-dx, -dy): np.arctan2(dy, dx) tells them apart.",
                     id="measurement-baf232",
                 ),
                 Mistake(
@@ -1952,7 +1957,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [-dx / r**2, dy / r**2, -1]]),
-                    "In the second row dx and dy are exchanged: only a shift across the line of sight turns it.",
+                    "In row 1 the first two entries have changed places: only a shift across the line of sight turns it.",
+                    id="measurement_jacobian-ddcb05",
                 ),
                 Mistake(
                     _rows(lambda dx, dy, r: [[dx / r, dy / r, 0], [dy / r**2, -dx / r**2, -1]]),
@@ -2393,7 +2399,8 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     lambda t, x, P: (t - x) @ np.linalg.solve(P, t - x),
-                    "The heading error is not wrapped: both headings are nearly the same direction.",
+                    "The heading error is not wrapped: 179 deg and -179 deg are nearly the same direction.",
+                    id="nees-63cd65",
                 ),
                 Mistake(
                     _nees_of(lambda true, found: _turned_once(true - found)),
@@ -2499,11 +2506,13 @@ CHAPTER = Chapter(
                 Mistake(lambda y, S, g: not gate(y, S, g), "Exactly the other way round: True means plausible."),
                 Mistake(
                     _gated(lambda y, S: y @ y),
-                    "You compare meters and radians with a number without unit: divide by the covariance S.",
+                    "You compare what has units, such as meters and radians, with a number that has none: divide by the covariance S.",
+                    id="gate-1a49bc",
                 ),
                 Mistake(
                     _gated(lambda y, S: np.linalg.norm(y)),
-                    "You compare meters and radians with a number without unit: divide by the covariance S.",
+                    "You compare what has units, such as meters and radians, with a number that has none: divide by the covariance S.",
+                    id="gate-1a49bc-2",
                 ),
                 Mistake(
                     _gated(lambda y, S: y @ (1 / S) @ y),
@@ -2662,13 +2671,14 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _batch_of_repeated_rows,
-                    "`np.repeat` writes the first row of C k times, then the second. The numbers of z follow one another measurement by measurement: `np.tile(C, (k, 1))`.",
+                    "Here the first row of C counts k times, then the second, as `np.repeat` writes them. The numbers of z follow one another measurement by measurement: `np.tile(C, (k, 1))`.",
+                    id="batch_estimate-69baed",
                 ),
                 Mistake(lambda *a: batch_estimate(*a)[::-1], "The order is state, covariance."),
                 Mistake(
                     _batch_weighed_twice,
-                    "You weigh twice: the inverse covariance stands before the rows, and least squares squares them. What stands before "
-                    "them is its root: np.linalg.solve(L, row), with L from np.linalg.cholesky of the covariance.",
+                    "The inverse covariances count squared here, as where they stand before the rows of least squares, which squares them. There their roots belong: np.linalg.solve(L, row), with L from np.linalg.cholesky of the covariance.",
+                    id="batch_estimate-4a8a61",
                 ),
                 Mistake(
                     _prior_with_each,
