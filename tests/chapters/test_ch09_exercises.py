@@ -1,6 +1,7 @@
 """Chapter 9's exercises: answers that look right and are not, and right ones of more than one style."""
 
 import linecache
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -396,6 +397,27 @@ def walked(first, step, share=1.0, more=0.0):
     return answer
 
 
+def in_steps_of_five_centimeters(grid, pose, bearing, r_max):
+    """What is half a cell in the building is returned for half a cell of every map."""
+    return in_steps_of_a_cell(grid, pose, bearing, r_max) / grid.resolution * 0.1
+
+
+def one_astray(x, u, dt, std_u, rng):
+    moved = odometry.step(x, moved_by(u, std_u, len(x), rng), dt)
+    moved[1:, 0] += np.abs(x[1:, 0]) > 50
+    return moved
+
+
+def turned_after_the_step(x, u, dt, std_u, rng):
+    noise = std_u * rng.standard_normal((len(x), 2))
+    moved = odometry.step(x, u + noise * [1.0, 0.0], dt)
+    return moved + dt * noise * [[0.0, 1.0]] @ [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+
+
+def divided_by_dt(x, u, dt, std_u, rng):
+    return odometry.step(x, u + std_u / dt * rng.standard_normal((len(x), 2)), dt)
+
+
 def in_whole_cells(grid, pose, bearing, r_max):
     return round(in_steps_of_a_cell(grid, pose, bearing, r_max) / grid.resolution)
 
@@ -598,7 +620,7 @@ PASSED_BEFORE = [
     ("sample_motion", forward_only, "go both ways"),
     ("should_resample", up_to_the_share, "not `<=`"),
     ("beam_weight", of_each_density, "the logarithm of 0"),
-    ("beam_weight", kept_from_zero, "what you add in its place"),
+    ("beam_weight", kept_from_zero, "what you put in its place"),
     ("distance_field_weight", field_of_each_density, "the logarithm of 0"),
     ("landmark_weight", landmarks_of_each_density, "the logarithm of 0"),
     ("resample_roulette", one_too_high, "the share of the one before it"),
@@ -610,6 +632,9 @@ PASSED_BEFORE = [
     ("cast_ray", walked(1.0, None), "begin farther out"),
     ("cast_ray", walked(0.0, None, share=0.9), "a little before r_max: your result is"),
     ("cast_ray", walked(0.0, 0.05), "typed in"),
+    ("cast_ray", in_steps_of_five_centimeters, "cells of 2 cm"),
+    ("sample_motion", turned_after_the_step, "also bends the way"),
+    ("sample_motion", divided_by_dt, "by std_u itself, whatever dt is. Was the noise"),
     ("cast_ray", walked(0.0, None, more=1.0), "A scanner sees r_max at most"),
     ("cast_ray", in_whole_cells, "You counted in cells"),
     ("multiply_weights", in_logarithms_doubled, "tiny likelihoods"),
@@ -644,7 +669,7 @@ PASSED_BEFORE = [
     ("cast_ray", walked(0.5, None), "some 20 cm away"),
     ("landmark_weight", by_the_arcsine, "folded at 90 deg"),
     ("circular_mean", lambda a, w: np.angle(np.sum(a * np.exp(1j * w))), "exchanged"),
-    ("sample_motion", by_one_pair, "moved alike"),
+    ("sample_motion", by_one_pair, "equally far"),
     ("hunt_1", lambda resample, rng: [chi_square(resample, rng)] if resample in ch09.GOOD else False, "got list"),
 ]
 
@@ -655,6 +680,12 @@ def test_what_was_right_on_typical_data_only_is_refused(name, answer, words, mon
         monkeypatch.setattr(budget, "LOOKING", 0.0)
     outcome = judge(name, answer)
     assert outcome.status == NOT_YET and words in outcome.text
+
+
+def test_of_particles_one_that_goes_astray_is_shown():
+    told = judge("sample_motion", one_astray).text
+    right, found = re.search(r"from .* to (.*)\. Yours gets to (.*)\.", told).groups()
+    assert right != found
 
 
 IN_NUMBERS_OF_STEPS = """

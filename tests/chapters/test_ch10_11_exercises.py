@@ -447,6 +447,32 @@ def bound(f, printed):
         found += max(abs(f(x + step) - f(x)), abs(f(x - step) - f(x)))
     return found
 """
+BY_FIND = """
+def half_unit(printed):
+    number, _, power = printed.replace(",", ".").partition("e")
+    return 0.5 * 10.0 ** (int(power or 0) - (len(number) - number.find(".") - 1))
+"""
+NEGATIVE_ALONE = """
+def half_unit(printed):
+    number, _, power = printed.replace(",", ".").partition("e")
+    decimals = len(number.split(".")[1]) if "." in number else 0
+    return 0.5 * 10.0 ** (min(int(power or 0), 0) - decimals)
+"""
+BEST_ALONE = """
+def suspects(entries, average):
+    def gap(t):
+        x, h = np.array(list(map(float, t))), np.array([half_unit(s) for s in t])
+        return abs(x[:-1].mean() - x[-1]), h[:-1].mean() + h[-1] + 1e-12
+    texts = [*entries, average]
+    off, allowed = gap(texts)
+    found = []
+    for k in range(len(texts) * (off > allowed)):
+        for other in single_slips(texts[k]):
+            left, allowed = gap([*texts[:k], other, *texts[k + 1:]])
+            if left <= allowed:
+                found.append((left, k))
+    return {min(found)[1]} if found else set()
+"""
 ALL_WITH_ALL = """
 def motions(F, S):
     inv = np.linalg.inv
@@ -464,8 +490,11 @@ def between_axes(T, apart):
     "module, id, text, told",
     [
         (ledger, "bound", UP, "moves of one direction"),
-        (ledger, "half_unit", THROUGH_FLOAT, "float() forgets"),
-        (ledger, "half_unit", LETTERS_OF_THE_FLOAT, "float() forgets"),
+        (ledger, "half_unit", THROUGH_FLOAT, "forgets how many digits"),
+        (ledger, "half_unit", LETTERS_OF_THE_FLOAT, "forgets how many digits"),
+        (ledger, "half_unit", BY_FIND, "all letters are counted as decimals"),
+        (ledger, "half_unit", NEGATIVE_ALONE, "An exponent may be positive as well"),
+        (ledger, "suspects", BEST_ALONE, "whose slip fits best"),
         (ledger, "half_unit", OF_THE_FLOAT, "too small on every draw"),
         (ledger, "half_unit", OF_ITS_FIRST_DIGIT, "wrong exactly where `printed` has no decimals"),
         (ledger, "bound", FORWARD, "slope times the half unit"),

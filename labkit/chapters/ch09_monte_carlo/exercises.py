@@ -155,6 +155,9 @@ def scan_in_a_wide_hall(rng, count=12):
     return _measured(maps.OccupancyGrid(cells, 1.0)), pose, ranges, bearings, float(rng.uniform(2.5, 5.0))
 
 
+WHOLE_SCAN = "right, but not for 541 beams and a std of about 3 m:"
+
+
 def whole_scan(draw):
     """The draw with as many beams as the scanner has, and so wide a std that a plain product of their densities is zero
     in float64.
@@ -270,12 +273,12 @@ def ray_in_a_fine_map(rng):
 
 
 def ray_down_a_hall(rng):
-    """A ray to a wall some twenty meters away, and a scanner that reaches 25 m."""
-    cells, start = np.full((40, 120), maps.FREE), rng.uniform(1.0, 3.0)
-    cells[:, 110:] = maps.OCCUPIED
+    """A ray to a wall some twenty meters away, in cells as wide as the building's, and a scanner that reaches 25 m."""
+    cells, start = np.full((80, 240), maps.FREE), rng.uniform(1.0, 3.0)
+    cells[:, 220:] = maps.OCCUPIED
     theta, angle = rng.uniform(-3, 3), rng.uniform(-0.05, 0.05)
     pose = np.array([start, rng.uniform(3.5, 4.5), theta])
-    return maps.OccupancyGrid(cells, 0.2), pose, float(planar.wrap_angle(angle - theta)), 25.0
+    return maps.OccupancyGrid(cells, 0.1), pose, float(planar.wrap_angle(angle - theta)), 25.0
 
 
 def ray_to_a_wall_close_by(rng):
@@ -617,7 +620,8 @@ DENSITIES = (
     ),
     (
         _log_density(peak=lambda std: -np.log(std * math.sqrt(2 * math.pi))),
-        "The factor 1 / (std sqrt(2 pi)) divides: its logarithm is subtracted.",
+        "std * sqrt(2 pi) divides each density: its logarithm is subtracted.",
+        "47e6de",
     ),
     (
         lambda x, std: _normal_log(x, std) / math.log(10),
@@ -643,14 +647,18 @@ ROUNDED_TO_ZERO = (
     ),
     (
         _lifted,
-        "Right but for large errors: there the density is zero in float64, and what you add in its place decides. Write down the logarithm's own formula.",
+        "Right but for large errors: there the density is zero in float64, and what you put in its place decides. Write down the logarithm's own formula.",
+        "02d19b",
     ),
 )
 
 
-def _density_mistakes(variant, readings):
+def _density_mistakes(exercise, variant, readings):
     """Slips in the density; variant(density, after=...) sums up densities of the readings, `after` is applied to it."""
-    slips = [Mistake(variant(density), text) for density, text in (*DENSITIES, *ROUNDED_TO_ZERO)]
+    slips = [
+        Mistake(variant(density), text, *(f"{exercise}-{end}" for end in id))
+        for density, text, *id in (*DENSITIES, *ROUNDED_TO_ZERO)
+    ]
     added = f"You added the densities. Independent {readings} multiply: their *logarithms* are added."
     return [*slips, Mistake(variant(_normal), added), Mistake(variant(_normal, after=_logarithm), added)]
 
@@ -1060,7 +1068,8 @@ RESAMPLING_SLIPS = (
     ),
     (
         lambda w, t: w.sum() < t * len(w),
-        "You compare the sum of the weights. Compare effective_size(weights).",
+        "You compare the sum of the weights, or their mean. Compare effective_size(weights).",
+        "should_resample-8c6474",
     ),
     (
         _up_to_the_share,
@@ -1242,7 +1251,7 @@ def _listens(draw):
                 )
             return "whatever `rng` is given, the same comes out: draw the random numbers from it."
         if not all(map(np.array_equal, first, again)):
-            return "two runs with the same seed differ: draw from the `rng` you are given, not from another one."
+            return "two runs with the same seed differ: draw from the `rng` you are given alone, and keep nothing for the next call."
         return None
 
     return check
@@ -1325,7 +1334,7 @@ def _shifted(found, expected):
             return f" Between the first and the last, each index gets the share of the one {neighbor} it: is it one too {slip}?"
     if np.abs(np.sort(found) - np.sort(expected)).max() < SHARE_OFF:
         return (
-            " The shares are the right ones, but each is another index's: has something been sorted, or turned around?"
+            " The shares are the right ones, but those of other indices: has something been sorted, or turned around?"
         )
     return ""
 
@@ -1389,8 +1398,8 @@ def _spins_are_independent(resample, rng):
         )
     if variance > 1.3:
         return (
-            f"some spins share their random number: a count varies by {variance:.1f} instead of 0.9 (variance of a "
-            "binomial). Each spin needs its own."
+            f"some spins go together: a count varies by {variance:.1f} instead of 0.9 (variance of a binomial). Each spin needs "
+            "a random number of its own."
         )
     half = float(counts[:, :5].sum(1).var())
     if half < HALF_VARIES:
@@ -1516,12 +1525,19 @@ def _noise_is_right(move, rng):
 
     off, along_x = errors(moved), moved[:, 0].std()
     if min(abs(along_x - t * std_u[0]) for t in (dt, 1.0)) < 0.1 * dt * std_u[0] and 2 * off["ahead"].std() < along_x:
-        return "the noise of v spreads the particles along x of the map. A robot drives along its heading: add it to u."
+        return (
+            "the noise of v spreads the particles along x of the map, and they head nearly along y. A robot drives along its "
+            "heading: add it to u."
+        )
     for name, wanted in (("ahead", dt * std_u[0]), ("in theta", dt * std_u[1]), ("aside", dt**2 * std_u[1] / 2)):
         if abs(off[name].std() - wanted) > 0.1 * wanted:
             longer = errors(np.asarray(move(states.copy(), u, 2 * dt, std_u, rng)))[name].std()
             return _other_spread(name, off[name], wanted, std_u, dt, longer)
     return _other_kind(off["ahead"], off["in theta"], dt)
+
+
+EQUALLY_FAR = "They all went equally far: draw a pair of random numbers for each."
+BENDS = "The noise of omega also bends the way: it belongs into the control, before the step."
 
 
 def _other_spread(name, noise, wanted, std_u, dt, longer):
@@ -1530,8 +1546,8 @@ def _other_spread(name, noise, wanted, std_u, dt, longer):
     own = name != "aside" and abs(amount - std) < 0.1 * std
     if own and abs(longer - amount) < 0.1 * amount:
         return (
-            f"4000 particles spread {name} by std_u itself, whatever dt is: the noise was added to the pose, or "
-            "after the step. It belongs to the control."
+            f"4000 particles spread {name} by std_u itself, whatever dt is. Was the noise added to the pose, or after the "
+            "step? It belongs to the control, as large as std_u says."
         )
     told = (
         f"4000 particles spread {name} by {amount:.3f} {unit} (standard deviation) after one step of {dt} s with "
@@ -1540,7 +1556,7 @@ def _other_spread(name, noise, wanted, std_u, dt, longer):
     if name == "in theta" and amount < 0.01 * wanted:
         return f"{told}. This was straight on, u = [1, 0]: omega has its noise there as well."
     if amount < 1e-9 * wanted:
-        return f"{told}. All particles moved alike: draw a pair of random numbers for each."
+        return f"{told}. {BENDS if name == 'aside' else EQUALLY_FAR}"
     if np.corrcoef(noise[:-1], noise[1:])[0, 1] > 0.5:
         return (
             f"{told}. The noise of each is like that of the one before: add its own to u itself, to each a fresh one."
@@ -1564,7 +1580,7 @@ def _other_spread(name, noise, wanted, std_u, dt, longer):
         )
         return f"{told}. It is larger by the root of 2, {twice}."
     if name == "aside":
-        return f"{told}. The noise of omega also bends the way: it belongs into the control, before the step."
+        return f"{told}. {BENDS}"
     return f"{told}."
 
 
@@ -1717,10 +1733,11 @@ def _reckons(move, states, u, dt, rng):
     off[:, 2] = planar.wrap_angle(off[:, 2])
     if np.abs(off).max() <= (1e-3 if moved.dtype == np.float32 else 1e-8):
         return None
-    start, right = np.round(states[0], 4).tolist(), np.round(odometry.step(states[0], u, dt), 4).tolist()
+    k = int(np.argmax(np.abs(off).max(axis=1)))
+    start, right = np.round(states[k], 4).tolist(), np.round(odometry.step(states[k], u, dt), 4).tolist()
     return (
         f"right from [1.0, 2.0, 1.5] with u = [1.0, 0.5] and dt = 0.2, but with std_u = 0, u = {list(u)} and dt = {dt} a "
-        f"particle must get from {start} to {right}. Yours gets to {np.round(moved[0], 4).tolist()}."
+        f"particle must get from {start} to {right}. Yours gets to {np.round(moved[k], 4).tolist()}."
     )
 
 
@@ -1740,7 +1757,7 @@ def _noise_off_is_reckoning(move, rng):
             "odometry.step returns not handed on?"
         )
     if np.abs(moved - odometry.step(states, (1.0, 0.5), 1.0)).max() < 1e-9:
-        return "the particles move as if dt were 1: hand dt to odometry.step."
+        return "with std_u = 0 the particles move as if dt were 1: does odometry.step get dt, and u as it is?"
     for model, way in (("euler", "straight along the old heading"), ("arc", "along the exact arc")):
         if np.abs(moved - odometry.step(states, (1.0, 0.5), 0.2, model)).max() < 1e-9:
             return f"with std_u = 0 your particles move {way}. odometry.step goes along the heading of half the turn: call it."
@@ -2026,7 +2043,11 @@ CHAPTER = Chapter(
                 Mistake(
                     _motion(lambda s: s[::-1]), "The two standard deviations have changed places: first v, then omega."
                 ),
-                Mistake(_motion(np.sqrt), "You took the root of std_u. It is a standard deviation, not a variance."),
+                Mistake(
+                    _motion(np.sqrt),
+                    "Your noise has the root of std_u as its standard deviation. std_u holds standard deviations, not variances.",
+                    "sample_motion-7aa5de",
+                ),
                 Mistake(
                     _motion(on_pose=True),
                     "You added the noise to the pose. Then a robot could slip sideways. The noise belongs to the control.",
@@ -2086,7 +2107,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(_landmarks(parts=(1, 0)), "The bearings are missing: both densities are multiplied."),
                 Mistake(_landmarks(parts=(0, 1)), "The ranges are missing: both densities are multiplied."),
-                *_density_mistakes(_landmarks, "readings"),
+                *_density_mistakes("landmark_weight", _landmarks, "readings"),
                 Mistake(
                     _landmark_plain_product,
                     "Right near the robot. Far from it the product is zero before you take its logarithm: add logarithms.",
@@ -2193,9 +2214,15 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         lambda beams=beams: beams,
-                        "From n = 8 on 0.01 to the power n is lost when it is added to 1. By itself it is a number above zero: it has an exponent of its own.",
+                        "0.01 to the power 8 is lost already when it is added to 1. By itself it is a number above zero: it has an exponent of its own.",
+                        id=f"beams_to_zero-7d9971{which}",
                     )
-                    for beams in (7, 9, 16, math.log(np.finfo(float).eps) / math.log(0.01))
+                    for beams, which in (
+                        (7, ""),
+                        (9, "-2"),
+                        (16, "-3"),
+                        (math.log(np.finfo(float).eps) / math.log(0.01), "-4"),
+                    )
                 ),
                 Mistake(lambda: 323, "That counts powers of ten. Each beam contributes two of them."),
                 Mistake(lambda: 324, "That counts powers of ten. Each beam contributes two of them."),
@@ -2239,7 +2266,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda l: np.logaddexp(0.0, logsumexp(l)),
-                    "Your sum begins with the logarithm 0, which is a weight of 1: exp(0). Begin with -inf, the logarithm of nothing.",
+                    "Your sum has a weight more, of 1 = exp(0). Does it begin with the logarithm 0? Begin with -inf, the logarithm of nothing.",
+                    "log_sum_exp-d6afaf",
                 ),
                 Mistake(
                     lambda l: l.min() + np.log(np.exp(l - l.min()).sum()),
@@ -2433,7 +2461,7 @@ CHAPTER = Chapter(
             draw=beams_at_a_pose,
             metric=metrics.Numbers(1e-6),
             noisy=[
-                (whole_scan(beams_at_a_pose), metrics.Numbers(1e-6), "Right for few beams, but not for 541:"),
+                (whole_scan(beams_at_a_pose), metrics.Numbers(1e-6), WHOLE_SCAN),
                 (beams_from_a_wrong_pose, metrics.Numbers(1e-6), "Right where the map fits, but not far off:"),
                 (
                     functools.partial(beams_of_a_sensor, sharpness=1.0, count=1),
@@ -2447,8 +2475,8 @@ CHAPTER = Chapter(
                         f"right, but not for {words}:",
                     )
                     for sharpness, words in (
-                        (1e3, "errors of fractions of a millimeter"),
-                        (0.01, "errors of many meters"),
+                        (1e3, "errors and a std of fractions of a millimeter"),
+                        (0.01, "errors and a std of many meters"),
                     )
                 ),
             ],
@@ -2474,7 +2502,7 @@ CHAPTER = Chapter(
                     lambda r, e, s: float((-0.5 * np.square((r - e) / s)).sum() - np.log(s * math.sqrt(2 * math.pi))),
                     "The factor 1 / (std sqrt(2 pi)) stands once in each density: as many times as there are beams.",
                 ),
-                *_density_mistakes(_beams, "beams"),
+                *_density_mistakes("beam_weight", _beams, "beams"),
                 Mistake(
                     lambda r, e, s: float(np.prod(_normal_log(r - e, s))),
                     "You multiplied logarithms. The logarithm of a product is the *sum* of the logarithms.",
@@ -2510,11 +2538,11 @@ CHAPTER = Chapter(
             fixed={"pose": POSE},
             metric=metrics.Numbers(1e-6),
             noisy=[
-                (whole_scan(scan_at_a_pose), metrics.Numbers(1e-6), "Right for few beams, but not for 541:"),
+                (whole_scan(scan_at_a_pose), metrics.Numbers(1e-6), WHOLE_SCAN),
                 (
                     scan_by_a_sharp_sensor,
                     metrics.Numbers(1e-6),
-                    "Right where the walls are near, but not far from them:",
+                    "right, but not for end points far from walls and a std of some millimeters:",
                 ),
                 (
                     scan_on_another_map,
@@ -2554,7 +2582,7 @@ CHAPTER = Chapter(
                     _field_plain_product,
                     "Right for few beams. With 541 the product is zero before you take its logarithm: sum up logarithms.",
                 ),
-                *_density_mistakes(_field_with, "beams"),
+                *_density_mistakes("distance_field_weight", _field_with, "beams"),
                 Mistake(
                     _field_rows_for_columns,
                     "Rows and columns have changed places: grid.cell_of gives the rows first, and grid.distance takes them first.",
@@ -2617,7 +2645,11 @@ CHAPTER = Chapter(
                 "return np.searchsorted(ends, rng.random(len(weights)) * ends[-1], side='right')`",
             ),
             mistakes=[
-                Mistake(_largest, "You always took the heaviest particle. It should be drawn most often, not always."),
+                Mistake(
+                    _largest,
+                    "You always took the heaviest particle. It should be drawn as often as its weight asks for.",
+                    "resample_roulette-87f542",
+                ),
                 Mistake(_uniform_choice, "All particles were drawn alike: the weights do not matter yet."),
                 Mistake(
                     lambda w, rng: np.arange(len(w)), "Every particle came out once: that is the set you started with."
@@ -2628,11 +2660,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda w, rng: _spin(w, rng, shift=1),
-                    "Off by one: np.searchsorted gives the index itself, nothing is to be added.",
+                    "Off by one: each index is one too high. np.searchsorted gives the index itself.",
+                    "resample_roulette-9c7597",
                 ),
                 Mistake(
                     lambda w, rng: _spin(w, rng, shift=-1),
-                    "Off by one: np.searchsorted gives the index itself, nothing is to be subtracted.",
+                    "Off by one: each index is one too low. np.searchsorted gives the index itself.",
+                    "resample_roulette-d2e0b0",
                 ),
                 Mistake(
                     lambda w, rng: np.full(len(w), np.searchsorted(np.cumsum(w), rng.random() * w.sum())),
@@ -2694,7 +2728,9 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(
-                    _largest, "You always took the heaviest particle. It should be met by most spokes, not by all."
+                    _largest,
+                    "You always took the heaviest particle. It should be met by as many spokes as its weight asks for.",
+                    "resample_systematic-d296b2",
                 ),
                 Mistake(
                     lambda w, rng: _turn(w, rng.random(len(w))),
@@ -2757,7 +2793,8 @@ CHAPTER = Chapter(
                 Mistake(lambda w, rng: _turn(w, 0.5), "The wheel has not been turned: start with one random number."),
                 Mistake(
                     lambda w, rng: np.arange(len(w)),
-                    "Every particle came out once: that is right for equal weights only.",
+                    "Every particle came out once: that is what equal weights give.",
+                    "resample_systematic-f6bb6e",
                 ),
             ],
             draws=8,
@@ -3031,11 +3068,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a, w: float(planar.wrap_angle(a.mean())),
-                    "The arithmetic mean of angles across the seam points backward. Average directions, not numbers.",
+                    "The arithmetic mean of angles across the seam may point backward. Average directions, not numbers.",
+                    "circular_mean-d2e690",
                 ),
                 Mistake(
                     lambda a, w: float(w @ a / w.sum()),
-                    "The arithmetic mean of angles across the seam points backward. Average directions, not numbers.",
+                    "The arithmetic mean of angles across the seam may point backward. Average directions, not numbers.",
+                    "circular_mean-d2e690-2",
                 ),
                 Mistake(
                     lambda a, w: float(w @ (a % (2 * math.pi)) / w.sum()),
@@ -3255,11 +3294,11 @@ CHAPTER = Chapter(
                     for camera, words in (
                         (
                             {"field_of_view": 2.6, "n": 640, "scale": 10.0},
-                            "a wide camera of 640 columns that sees dozens of meters",
+                            "a wide camera of 640 columns that sees dozens of meters, some depths just beside a limit",
                         ),
                         (
                             {"field_of_view": 0.1, "n": 2, "scale": 0.01},
-                            "a narrow camera of 2 columns that sees centimeters",
+                            "a narrow camera of 2 columns that sees centimeters, both depths just beside a limit",
                         ),
                     )
                 ),

@@ -260,10 +260,21 @@ def _letters_behind_the_point(printed):
     return _ends_at_the_exponent(printed) if has_a_point else half_unit(printed)
 
 
+def _exponents_above_0_dropped(printed):
+    number, _, exponent = printed.partition("e")
+    return half_unit(printed if exponent.startswith("-") else number)
+
+
 def _exponents_below_0(printed):
     """Every exponent read as a negative one."""
     number, _, exponent = printed.partition("e")
     return half_unit(number) * 10.0 ** -abs(int(exponent or 0))
+
+
+def _all_letters_without_a_point(printed):
+    """As with `find`, which gives -1 where there is no point."""
+    number, _, exponent = printed.replace(",", ".").partition("e")
+    return 0.5 * 10.0 ** (int(exponent or 0) - (len(number) - number.find(".") - 1))
 
 
 def _hundreds(printed):
@@ -399,7 +410,8 @@ def _cut_off(printed, value, bound, misprint, simulated):
 STATUSES = (
     (
         _close_by_default,
-        "np.isclose allows a share of the number besides: rtol=1e-5 unless you write rtol=0. Half unit and bound are all that is allowed.",
+        "You allow something besides, a share of the number perhaps, as np.isclose does unless you write rtol=0. Half unit and bound are all that is allowed.",
+        "status-54d06c",
     ),
     *(
         (
@@ -656,9 +668,14 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         variant,
-                        "float() forgets how many digits were printed: 1.010000 has six decimals, 12 has none. Work on the string.",
+                        "A number, as float() makes it, forgets how many digits were printed: 1.010000 has six decimals, 12 has none. Work on the string.",
+                        id=f"half_unit-6298d2{which}",
                     )
-                    for variant in (_through_float, _as_float_prints_it, _letters_of_the_float)
+                    for variant, which in (
+                        (_through_float, ""),
+                        (_as_float_prints_it, "-2"),
+                        (_letters_of_the_float, "-3"),
+                    )
                 ),
                 Mistake(
                     _digits_left(_without_zeros),
@@ -713,7 +730,11 @@ CHAPTER = Chapter(
                         variant,
                         "An exponent may be positive as well: 3.20e3 has two decimals, and its last digit is worth 10.",
                     )
-                    for variant in (_negative_exponents_alone, _exponents_below_0)
+                    for variant in (_negative_exponents_alone, _exponents_below_0, _exponents_above_0_dropped)
+                ),
+                Mistake(
+                    _all_letters_without_a_point,
+                    "Where there is no point, all letters are counted as decimals, as with `find`, which gives -1 there. A whole number has no decimals.",
                 ),
                 Mistake(_with_the_sign, "Half a unit is a size, without a sign: that of -0,250 is 0.0005."),
                 Mistake(
@@ -730,7 +751,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda printed: half_unit(printed) / 10,
-                    "One decimal too many: with d decimals half a unit is 0.5 * 10**-d.",
+                    "That is a tenth of half a unit: with d decimals half a unit is 0.5 * 10**-d.",
+                    "half_unit-36c0ef",
                 ),
                 Mistake(
                     _of_the_value, "You took a share of the value. The unit of the last digit does not depend on it."

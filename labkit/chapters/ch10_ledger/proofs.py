@@ -755,6 +755,20 @@ def _first_alike(k, other, entries):
     return entries.index(entries[k]) if k < len(entries) else k
 
 
+def _best_alone(entries, average):
+    """The one whose slip leaves the smallest gap."""
+    if _agree(entries, average):
+        return set()
+    gaps = []
+    for k in suspects(entries, average):
+        for other in single_slips([*entries, average][k]):
+            trial = [*entries, average]
+            trial[k] = other
+            if _agree(trial[:-1], trial[-1]):
+                gaps.append((abs(_mean(list(map(number, trial[:-1]))) - number(trial[-1])), k))
+    return {min(gaps)[1]} if gaps else set()
+
+
 def _average_at_last(entries, average):
     """The average is suspected where no entry is."""
     found = suspects(entries, average)
@@ -922,8 +936,9 @@ SUSPECTS = Exercise(
         ),
         Mistake(
             _cut_to_the_longest,
-            "A NumPy array of texts keeps the length of the longest: of a slip with a digit more the end is cut off. "
-            "Keep texts in a list.",
+            "This is what comes out when a slip with a digit more is cut off at the end: a NumPy array of texts keeps "
+            "the length of the longest. Keep texts in a list.",
+            id="suspects-c74af1",
         ),
         Mistake(
             lambda entries, average: len(suspects(entries, average)),
@@ -944,10 +959,11 @@ SUSPECTS = Exercise(
         *(
             Mistake(
                 _search(agree=_allow(lambda halves, own: 0.0), first_agree=first),
-                "All numbers were rounded: agreement to the last bit is too much to ask. Allow what their half units "
-                "hide.",
+                "All numbers were rounded: agreement to the last bit, or nearly, is too much to ask. Allow what their "
+                "half units hide.",
+                id=f"suspects-a8851e{which}",
             )
-            for first in (None, _agree)
+            for first, which in ((None, ""), (_agree, "-2"))
         ),
         *(
             Mistake(
@@ -968,8 +984,9 @@ SUSPECTS = Exercise(
         ),
         Mistake(
             _search(agree=_close_agrees),
-            "np.isclose allows a small share of the number, whatever was printed. Allow what the half units of entries "
-            "and average hide.",
+            "You allow a small share of the number, as np.isclose does, whatever was printed. Allow what the half "
+            "units of entries and average hide.",
+            id="suspects-4cfd9e",
         ),
         *(
             Mistake(
@@ -1035,7 +1052,12 @@ SUSPECTS = Exercise(
         ),
         Mistake(
             _search(first=True),
-            "You stop at the first that explains it. Whether another explains it as well is the point.",
+            "You name the first that explains it, and no other. Whether another explains it as well is the point.",
+            id="suspects-2beee9",
+        ),
+        Mistake(
+            _best_alone,
+            "You name the one whose slip fits best, and no other. Whether another explains it as well is the point.",
         ),
         Mistake(
             _search(give=lambda k, other, entries: k + 1),
