@@ -93,6 +93,7 @@ COUNTING = {"num", "size", "shape"}  # keywords behind which a number counts som
 NO_COUNTS = {"polyfit", "swapaxes", "moveaxis", "roll", "diff", "matrix_power", "percentile", "quantile"}
 TURNED = {"sin": "cos", "cos": "sin"}
 TURNS = {90: "np.pi / 2", 180: "np.pi", 360: "2 * np.pi"}
+TO_RADIANS = {"deg2rad", "radians"}
 ROUNDING = ("round", "around")
 EDGES = (  # (functions, what they take, how it is kept there, as it is told)
     (("arccos", "arcsin", "acos", "asin"), ("clip", (-1, 1)), "beyond -1 or 1, and `np.clip` to -1 ... 1"),
@@ -903,11 +904,23 @@ def _mends(words, node, new):
     """What is wrong with a function that this change makes right."""
     if isinstance(node, ast.Name):
         return _name_that_mends(words, node, new)
+    if _is_of_degrees(node) and isinstance(new, ast.Call | ast.Constant):
+        return ""
     for said, told in REVERSED:
         if re.fullmatch(said, words):
             told = re.sub(said, told, words)
             return re.sub(r"^(two .+|the factors .+|.* and .+|the two .+) is ", r"\1 are ", told)
     return ""
+
+
+def _is_of_degrees(node):
+    """Whether this makes radians of a number that is typed in, beyond a whole turn if it were radians itself: left in
+    degrees it is a bound that nothing reaches, or any angle.
+    """
+    if not isinstance(node, ast.Call) or _called(node) not in TO_RADIANS or not node.args:
+        return False
+    typed = getattr(node.args[0], "value", None)
+    return isinstance(typed, int | float) and abs(typed) > 2 * math.pi
 
 
 def _name_that_mends(words, node, new):

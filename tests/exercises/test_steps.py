@@ -1381,6 +1381,11 @@ def test_of_parts_that_look_alike_the_larger_part_is_quoted_as_well():
             "`clip` is too much",
         ),
         (
+            lambda a, b: a[0] + b,
+            "limit = np.deg2rad(20)\nx, y = np.minimum(a[0], limit), np.minimum(b, limit)\nreturn x + y",
+            "`minimum` is too much, and the same in `np.minimum(b, limit)` (line 3)",
+        ),
+        (
             lambda a, b: np.sin(a) + np.cos(b),
             "s, c = np.round(np.sin(a), 1), np.round(np.cos(b), 1)\nreturn s + c",
             "`round` is too much, and the same in `np.round(np.cos(b), 1)` (line 2)",
