@@ -145,7 +145,8 @@ def _rotation_kind(matrices, what):
         return f"your {what} is not orthonormal{_on_some(sheared)}: {_sheared_words(np.max(off, axis=0))}"
     mirrored = [(np.linalg.det(r) < 0).any() for r in matrices]
     if any(mirrored):
-        cause = "does an axis point the wrong way, have two changed places?"
+        at_times = "an axis may come out either way, and so may U @ Vt of an SVD: look at the determinant"
+        cause = "does an axis point the wrong way, have two changed places?" if all(mirrored) else at_times
         return f"your {what} is a reflection{_on_some(mirrored)}, its determinant is -1: {cause}"
     return None
 

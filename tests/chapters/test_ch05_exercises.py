@@ -169,6 +169,45 @@ def fitted(moved, seen):
     return Rotation.align_vectors(moved, seen)[0].as_matrix()
 
 
+def pose_that_fits_best(T_FS, T_BF, x_S, target):
+    """The scanner's pose from the points in both frames at once, without a step."""
+    y = frames.transform(frames.invert(T_BF), np.tile(target, (len(x_S), 1)))
+    R = fitted(y - y.mean(axis=0), x_S - x_S.mean(axis=0))
+    return frames.pose(R, y.mean(axis=0) - R @ x_S.mean(axis=0))
+
+
+def the_other_way_round(A, B):
+    F = np.zeros(12)
+    F[3::4] = -A[:3, 3]
+    return np.kron(np.eye(3), B.T) - np.kron(A[:3, :3], np.eye(4)), F
+
+
+def half_the_derivatives(alpha, beta, base, std, h=1e-6):
+    height = ITEMS["height_from_angles"].reference
+    ahead = height(np.array([alpha + h, alpha]), np.array([beta, beta + h]), base)
+    return std * np.linalg.norm((ahead - height(alpha, beta, base)) / (2 * h))
+
+
+def turned_about(T_BF, x_S):
+    """The fit of moves from the first pose without a look at its determinant."""
+    moved = -(T_BF[1:, :3, 3] - T_BF[0, :3, 3]) @ T_BF[0, :3, :3]
+    U, _, Vt = np.linalg.svd(moved.T @ (x_S[1:] - x_S[0]))
+    return U @ Vt
+
+
+@pytest.mark.parametrize(
+    "name, answer, said",
+    [
+        ("gauss_newton_on_pose", pose_that_fits_best, "the pose that fits best. Asked for is one step"),
+        ("kim_system", the_other_way_round, "with X B − A X with a plus"),
+        ("height_std", half_the_derivatives, "a difference over one step is divided by one step"),
+        ("li_rotation", turned_about, "so may U @ Vt of an SVD"),
+    ],
+)
+def test_what_is_told_is_true_of_every_way_to_the_same_result(name, answer, said):
+    assert said in judged(name, answer).text
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_li_by_any_differences_is_right_and_by_three_poses_is_not(seed):
     def consecutive(T_BF, x_S):
@@ -294,6 +333,8 @@ def test_the_last_explanation_of_a_row_is_not_the_most_credible():
 
     assert "explanations` puts that one first" in exercises._judge_ambiguous(last)
     assert exercises._judge_ambiguous(exercises.find_misprints) is None
+    silent = exercises._judge_ambiguous(lambda entries: {e for e in exercises.find_misprints(entries) if e[1] != 12})
+    assert silent.startswith("on one more table not all misprints are named")
 
 
 @pytest.mark.parametrize("name", ["robust_weights", "position_accuracy", "repeatability"])

@@ -216,7 +216,7 @@ def test_what_is_wrong_for_two_kinds_of_values_is_not_called_right_but_for_one()
         return d / (1.4826 * np.median(d) + 1e-3) <= factor
 
     told = texts("reject_outliers", kept_from_0)
-    assert all(text.startswith("Right in ordinary cases as long as fewer than half") for text in told)
+    assert all(text.startswith("Right in ordinary cases where hardly any values are equal") for text in told)
 
 
 def test_quartiles_are_no_median_of_distances():
@@ -372,6 +372,19 @@ def from_one_to_another(order):
     return found
 
 
+def by_fourier(time, reference, delayed, max_offset):
+    step, (a, b) = time[1] - time[0], map(np.fft.fft, (reference, delayed))
+    shifts = np.arange(-round(max_offset / step), round(max_offset / step) + 1)
+    alike = np.fft.ifft(b * a.conj()).real[shifts]
+    k = np.clip(alike.argmax(), 1, len(shifts) - 2)
+    left, middle, right = alike[k - 1 : k + 2]
+    return (shifts[k] + 0.5 * (left - right) / (left - 2 * middle + right)) * step
+
+
+def test_motions_from_pose_to_pose_are_told_without_a_word_of_their_size():
+    assert "They are shorter" not in ITEMS["mounting"].judge(ch06._from_pose_to_pose()).text
+
+
 @pytest.mark.parametrize(
     "name, answer, said, unsaid",
     [
@@ -385,6 +398,8 @@ def from_one_to_another(order):
         ),
         ("static_error_and_lag", from_one_to_another(lambda v: np.arange(len(v))), "error of the first reading", "off"),
         ("static_error_and_lag", from_one_to_another(np.argsort), "error of the slowest reading", "off"),
+        ("kron_row", lambda A, B: np.eye(9), "Your block is an orthogonal matrix", "product alone"),
+        ("time_offset", by_fourier, "or an FFT. Compare only the part both curves share", "off"),
     ],
 )
 def test_what_is_told_of_a_wrong_answer_is_true_of_it(name, answer, said, unsaid):

@@ -550,7 +550,7 @@ ACCURACY = [
             ),
             Mistake(
                 lambda reached: float(np.linalg.norm(reached.std(axis=0, ddof=1)) * 3),
-                "You took standard deviations of the coordinates. First the distances from the mean, one number an arrival.",
+                "This is three times the root of the sum of the squared distances over n − 1; the standard deviations of the coordinates, put together, give the same. Take the distances from the mean, one number an arrival: their mean, and three times how much they differ among themselves.",
                 id="repeat-coordinates",
             ),
             Mistake(
@@ -731,7 +731,7 @@ TRIANGULATION = [
             ),
             Mistake(
                 _height(lambda a, b, L: L * (a + b)),
-                "The base is multiplied by both tangents. H = L / (1/tan α + 1/tan β).",
+                "The base is multiplied by the sum of both tangents. H = L / (1/tan α + 1/tan β).",
                 id="height-times-tangents",
             ),
             Mistake(
@@ -836,7 +836,7 @@ TRIANGULATION = [
             ),
             Mistake(
                 _std(lambda a, b, s: s * np.hypot(a, b) / 2),
-                "Half of it: the two effects are no mean, each angle moves the height by itself.",
+                "Your result is half of what it should be: no mean of the two effects is asked for, and a difference over one step is divided by one step.",
                 id="std-mean",
             ),
             Mistake(
@@ -952,7 +952,7 @@ LITERATURE = [
             ),
             Mistake(
                 _rotation(lambda R, t, x: _fit(-t @ R, x).T),
-                "This is the transpose: it turns from the flange into the scanner. Sum (moved)(seen)ᵀ, not (seen)(moved)ᵀ.",
+                "This is the transpose: it turns from the flange into the scanner. R_FS turns what is seen into what was moved, so sum (moved)(seen)ᵀ.",
                 id="li-transposed",
             ),
             Mistake(
@@ -1042,7 +1042,7 @@ LITERATURE = [
         mistakes=[
             Mistake(
                 _translation(right=lambda R, t, arm, x, R_FS: t + arm),
-                "Both results have the wrong sign: t_BF and R_BF R_FS x_S go to the right side with a minus.",
+                "Both results have the wrong sign: R_BF t_FS − target = −(t_BF + R_BF R_FS x_S), with a minus on the right.",
                 id="step2-sign",
             ),
             Mistake(
@@ -1057,7 +1057,7 @@ LITERATURE = [
             ),
             Mistake(
                 _translation(right=lambda R, t, arm, x, R_FS: arm - t),
-                "t_BF and R_BF R_FS x_S go to the right side together, both with a minus.",
+                "t_BF and R_BF R_FS x_S go to the right side together, with one sign: R_BF t_FS − target = −(t_BF + R_BF R_FS x_S).",
                 id="step2-one-sign",
             ),
             Mistake(
@@ -1129,12 +1129,12 @@ LITERATURE = [
             ),
             Mistake(
                 _kim(_rows, _turned_back, lambda A: _moved(A, 1.0)),
-                "F has the wrong sign: the last column of A stands on the left, and goes to the right with a minus.",
+                "F has the wrong sign for this D: with A X − X B the last column of A goes to F with a minus, with X B − A X with a plus.",
                 id="kim-sign",
             ),
             Mistake(
                 _kim(_rows, _turned_back, lambda A: np.zeros(12)),
-                "F is zero, but the 1 in X's last row leaves the last column of A without a u: −a14, −a24, −a34.",
+                "F is zero, but the 1 in X's last row leaves the last column of A without a u: it goes to F, with a minus beside A X − X B.",
                 id="kim-no-right-side",
             ),
             Mistake(

@@ -897,7 +897,7 @@ def _mean_distance():
 
 
 GROWS_BEYOND = (
-    "Below u = 1 the weight is (1 - u^2)^2, beyond it 0. Yours grows there, and the worst poses get the most say."
+    "Below u = 1 the weight is (1 - u^2)^2, beyond it 0. Yours grows beyond, and from u = 1.41 on it is more than 1."
 )
 ALL_FIXED = (2, 3, 4, 7, 12, 21, 30)
 
@@ -987,12 +987,12 @@ CHAPTER = Chapter(
                 "return -a[0]/2, -a[1]/2, np.sqrt(a[0]**2/4 + a[1]**2/4 - a[2])`",
             ),
             mistakes=[
-                Mistake(_circle(lambda x, z, r: (-x, -z, r)), "Your center has the opposite sign: a1 = -2 xc, so xc = -a1/2."),
+                Mistake(_circle(lambda x, z, r: (-x, -z, r)), "Your center has the opposite sign. With a1 = -2 xc, as in the text, xc = -a1/2.", id="fit_circle-77849e"),
                 Mistake(_circle(lambda x, z, r: (-2 * x, -2 * z, r)), "You return a1 and a2 themselves. The center is -a1/2, -a2/2."),
                 Mistake(_circle(lambda x, z, r: (-2 * x, -2 * z, x * x + z * z - r * r)),
                         "You return a1, a2 and a3 themselves. The center is -a1/2, -a2/2; the radius follows from a3."),
                 Mistake(_circle(lambda x, z, r: (x, z, np.sqrt(3 * x * x + 3 * z * z + r * r))),
-                        "a1 and a2 entered the radius whole. They are -2 xc and -2 zc: halve them before you square."),
+                        "Twice the center entered the radius, as a1 and a2 hold it (-2 xc and -2 zc): halve before you square.", id="fit_circle-7bfed6"),
                 Mistake(_circle(lambda x, z, r: (x, z, np.sqrt(x * x + z * z - r * r))),
                         "Your radius is the root of a3 alone, but a3 = xc^2 + zc^2 - r^2: solve for r."),
                 Mistake(_circle_through(lambda n: [0, n // 2, -1]), "Three points make a circle, with all their noise in it. Let every point of the scan line count."),
@@ -1010,7 +1010,7 @@ CHAPTER = Chapter(
                 Mistake(_circle(lambda x, z, r: (2 * x, 2 * z, np.sqrt(3 * x * x + 3 * z * z + r * r))),
                         "The halves are missing: a1 = -2 xc, so xc = -a1/2, and zc = -a2/2; the radius follows from these."),
                 Mistake(_circle(lambda cx, cz, r: (cx, cz, 2 * r)), "Your third number is the diameter. The radius is asked for."),
-                Mistake(_circle_through_origin, "The column of ones is missing: without a3 every circle goes through the origin."),
+                Mistake(_circle_through_origin, "Your circle goes through the origin, as every circle without a3 does. It is what the column of ones is for.", id="fit_circle-2133a7"),
             ],
         ),
         Prediction(
@@ -1163,7 +1163,7 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(_forward, "This is the forward difference of listing C4, off by h f''/2. Take the step in both directions."),
                 Mistake(_backward, "This is the backward difference. Take the step in both directions."),
-                Mistake(lambda f, x, h: _central(f, x, h) * h * h, "`/ 2 * step` divides by 2 and then multiplies by the step: write / (2 * step)."),
+                Mistake(lambda f, x, h: _central(f, x, h) * h * h, "Your differences are halved and then multiplied by the step, as by `/ 2 * step`. Divide by both: / (2 * step).", id="numeric_jacobian-49395f"),
                 Mistake(lambda f, x, h: _central(f, x, 1e-6), "This is what a far smaller step than `step` gives, or the derivative itself. Use the argument `step`: the figure below varies it.", id="numeric_jacobian-dce1a6"),
                 Mistake(lambda f, x, h: (f(x + h) - f(x - h)) / (2 * h), "You moved all variables at once. Move one at a time: one column each."),
                 Mistake(lambda f, x, h: -_central(f, x, h),
@@ -1214,7 +1214,7 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(functools.partial(_jacobian, sign=1.0), "The first three columns have the wrong sign: phi x x = -[x] phi."),
                 Mistake(lambda T, B, x: _jacobian(T, B, frames.transform(T, x), left=True),
-                        "Your arm is T_FS x_S: the rotation would turn about the flange's origin, translation included. Only x_S itself is turned."),
+                        "Your arm is T_FS x_S: this turns about the origin and the axes of F, exp(phi) T_FS. Here phi turns x_S alone, in the scanner's axes: R_BF R_FS [x_S].", id="analytic_jacobian-256065"),
                 Mistake(lambda T, B, x: _jacobian(T, B, frames.transform(T, x)),
                         "Your arm is T_FS x_S, turned by R_FS once more. phi turns x_S itself, in the scanner's axes: R_BF R_FS [x_S]."),
                 Mistake(lambda T, B, x: analytic_jacobian(T, B, x).reshape(-1, 3, 6).swapaxes(0, 1).reshape(-1, 6),
@@ -1267,7 +1267,7 @@ CHAPTER = Chapter(
                 Mistake(_step_in_two_frames, "Your residuals stand along the axes of F, the rows of the Jacobian in B: bring both into one frame.", id="gauss_newton-two-frames"),
                 Mistake(_step_of_nine, "Your step moves the sphere center as well, nine unknowns. Here the target is held fixed: six columns.", id="gauss_newton-nine"),
                 Mistake(_step_of_translation, "Only tau is solved for. Rotation and translation move the residuals together: all six columns at once.", id="gauss_newton-translation"),
-                Mistake(_iterated, "You iterated to the end. Asked for is one step."),
+                Mistake(_iterated, "This is where the steps end, the pose that fits best. Asked for is one step.", id="gauss_newton_on_pose-a1607f"),
                 Mistake(lambda *a: gauss_newton_on_pose(gauss_newton_on_pose(*a), *a[1:]), "You took two steps. Asked for is one."),
                 Mistake(_stepped(lambda T, s: s), "You return the step. Move the pose by it: R_FS exp(phi) and t_FS + tau."),
                 Mistake(_stepped(lambda T, s: frames.pose(exp_so3(s[:3]), s[3:]) @ T),
@@ -1383,7 +1383,7 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3].T, T[:3, 3]), c)),
-                        "Your rotation is the transpose: the nine unknowns came back in the other order (rows and columns)."),
+                        "Your rotation is the transpose: perhaps the nine unknowns came back in the other order (rows and columns).", id="linear_start-5d0710"),
                 Mistake(_linear(lambda T, c: (T, -c)), "The target has the wrong sign: it stands on the other side of the equation, with -R_BF^T."),
                 Mistake(_linear_without_rotation, "On noisy data your nine numbers are not a rotation: take the nearest one."),
                 Mistake(_linear(lambda T, c: (frames.invert(T), c)), "Your pose is the inverse, T_SF."),
@@ -1391,14 +1391,14 @@ CHAPTER = Chapter(
                 Mistake(_linear_with_unturned_right_side, "Your right side is -t_BF. It is to be turned into the flange frame as well: -R_BF^T t_BF."),
                 Mistake(_linear_without_turning_back, "You multiplied by R_BF where R_BF^T is needed: bring everything into the flange frame."),
                 Mistake(functools.partial(_linear_by, right=-1.0),
-                        "The right side has the wrong sign: it is -R_BF^T t_BF."),
+                        "The right side has the wrong sign for your left one: R_FS x + t_FS - R_BF^T target = -R_BF^T t_BF.", id="linear_start-b9d505"),
                 Mistake(functools.partial(_linear_by, rotation=lambda M: np.linalg.qr(M)[0]),
                         "QR leaves the signs of its columns open, and trusts the first one most. Take the nearest rotation."),
                 *(Mistake(functools.partial(_linear_by, rotation=functools.partial(_gram_schmidt, by_rows=by_rows)),
                           "Gram-Schmidt keeps the direction of one axis and bends the others to it. The nearest rotation trusts all three alike.",
                           id=f"linear_start-gram-schmidt-{by_rows + 1}") for by_rows in (False, True)),
                 Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3], c), T[:3, 3])),
-                        "t_FS and the center have changed places: after the nine entries of R_FS come t_FS, then c."),
+                        "t_FS and the center have changed places. In which order do your unknowns stand?", id="linear_start-b9ba7f"),
             ],
         ),
         Exercise(
@@ -1422,12 +1422,12 @@ CHAPTER = Chapter(
                         "You took the median of all entries. Take the median of the lengths, one per pose."),
                 Mistake(lambda e: _tukey(np.linalg.norm(e, axis=1) / (5 * 1.4826 * np.median(np.abs(e)))),
                         "Your scale is 1.4826 times the median of all entries. Take the median of the lengths, one per pose, and divide it by 1.538.", id="robust-weights-mad-of-entries"),
-                Mistake(_weights(lambda r: _tukey(r / 5 * np.median(r) / robust.MEDIAN_CHI3)), "`/ 5 * s` divides by 5 and multiplies by s: write / (5 * s)."),
+                Mistake(_weights(lambda r: _tukey(r / 5 * np.median(r) / robust.MEDIAN_CHI3)), "Your lengths are divided by 5 and multiplied by s, as by `/ 5 * s`. Divide by both: / (5 * s).", id="robust_weights-33979a"),
                 Mistake(_weights(lambda r: _tukey((r / (5 * np.median(r) / robust.MEDIAN_CHI3)) ** 2)), "u itself is squared in the formula, yours is squared twice."),
                 Mistake(_weights(lambda r: (1 - (r / (5 * np.median(r) / robust.MEDIAN_CHI3)) ** 2) ** 2),
-                        GROWS_BEYOND),
+                        GROWS_BEYOND, id="robust_weights-37ae9f"),
                 Mistake(_weights(lambda r: np.where(r < 5 * np.median(r) / robust.MEDIAN_CHI3, 0, (1 - (r / (5 * np.median(r) / robust.MEDIAN_CHI3)) ** 2) ** 2)),
-                        GROWS_BEYOND),
+                        GROWS_BEYOND, id="robust_weights-37ae9f-2"),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r)))), "The median length of a 3-vector is 1.538 standard deviations: divide by it."),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.median(r) / 0.6745))), "1.4826 (= 1/0.6745) belongs to single numbers. The length of a 3-vector has the median 1.538: divide by that."),
                 Mistake(_weights(lambda r: _tukey(r / (5 * np.std(r)))), "Your scale is the standard deviation of the lengths: the outliers stretch it. Take the median length / 1.538."),
@@ -1631,7 +1631,9 @@ def _judge_ambiguous(student):
     """
     entries = entries_with_more_slips(np.random.default_rng(0), mended=(2, 21))[0]
     wanted = find_misprints(entries)
-    off = named_entries().admit(student(entries), wanted) ^ wanted
-    if off and {pose for _, pose, _ in off} == {12}:
+    named = named_entries().admit(student(entries), wanted)
+    off = named ^ wanted
+    of_12 = {entry for entry in named if entry[1] == 12}
+    if of_12 and not of_12 & wanted and {pose for _, pose, _ in off} == {12}:
         return "several entries explain row 12, and yours is not the most credible: `explanations` puts that one first."
     return "on one more table not all misprints are named, or too many entries are." if off else None

@@ -777,7 +777,7 @@ SPEEDS = [
         mistakes=[
             Mistake(
                 _line(_square, _square, lambda i, s: (np.sqrt(s), np.sqrt(i))),
-                "The two have changed places: `np.polyfit` gives the slope first.",
+                "The two have changed places: e0 comes first, from the intercept (`np.polyfit` gives the slope first).",
                 id="static_error_and_lag-swapped",
             ),
             Mistake(
@@ -1016,7 +1016,7 @@ CELL = [
             ),
             Mistake(
                 _carried(part=slice(3, 6)),
-                "A pose that is turned a little moves the point by its lever, which is the largest part here. Use all six rows of cov_T.",
+                "The turn of the pose is missing: it moves the point by its lever. Use all six rows of cov_T.",
                 id="point_covariance-no-lever",
             ),
             Mistake(

@@ -740,11 +740,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _fields(quaternion=8),
-                    "You skipped the three accelerations: the quaternion comes behind them, numbers 11 to 14.",
+                    "Your quaternion begins with the three accelerations. It comes behind them, numbers 11 to 14.",
+                    id="decode_packet-3b6145",
                 ),
                 Mistake(
                     _fields(quaternion=15),
-                    "These are angular velocities. The quaternion starts at byte 88, which is number 11.",
+                    "Your quaternion begins with the angular velocities. It starts at byte 88, which is number 11.",
+                    id="decode_packet-f12f2d",
                 ),
                 Mistake(
                     _fields(position=8),
@@ -1057,14 +1059,15 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         variant,
-                        "This is one product alone. The block of A X - X B = 0 is a difference of two, each with its own kron, and with I.",
+                        "Your block is an orthogonal matrix, as one kron of two rotations is: only X = 0 solves it. The block of A X - X B = 0 is a difference of two such products.",
+                        id=f"kron_row-a04e51{also}",
                     )
-                    for variant in (
-                        lambda A, B: np.kron(B.T, A),
-                        lambda A, B: np.kron(A, B.T),
-                        lambda A, B: np.kron(A, B),
-                        lambda A, B: np.kron(np.eye(3), A),
-                        lambda A, B: np.kron(B.T, np.eye(3)),
+                    for also, variant in (
+                        ("", lambda A, B: np.kron(B.T, A)),
+                        ("-2", lambda A, B: np.kron(A, B.T)),
+                        ("-3", lambda A, B: np.kron(A, B)),
+                        ("-4", lambda A, B: np.kron(np.eye(3), A)),
+                        ("-5", lambda A, B: np.kron(B.T, np.eye(3))),
                     )
                 ),
             ],
@@ -1260,7 +1263,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda M: (_values(M)[-2] / _values(M)[0]) ** 2,
-                    "These are the eigenvalues of M^T M, which are the squares of the singular values of M.",
+                    "This is the square of the ratio, that of two eigenvalues of M^T M: they are the squares of the singular values of M.",
                     id="singular_value_ratio-squares",
                 ),
                 Mistake(
@@ -1327,7 +1330,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _translation(lambda A: np.eye(3) - np.swapaxes(A[:, :3, :3], 1, 2), _k2),
-                    "The rotations of the motions are transposed.",
+                    "K1 holds the rotations of the motions transposed: (I - R_A) t = t_A - R t_B.",
+                    id="translation_lsq-3399ce",
                 ),
                 Mistake(
                     lambda A, B, R: np.linalg.lstsq(_k1(A)[0], _k2(A, B, R)[0], rcond=None)[0],
@@ -1595,7 +1599,7 @@ CHAPTER = Chapter(
                 (
                     mostly_equal,
                     KeptOrAll(),
-                    "Right as long as fewer than half of the values are equal. Where more are, the robust standard deviation is 0, and only what "
+                    "Right where hardly any values are equal. Where more than half are, the robust standard deviation is 0, and only what "
                     "lies at the median itself is within a limit of 0 (or all may stay):",
                 ),
                 (
@@ -1745,12 +1749,12 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: _mounting(R=np.eye(3)) @ pose(_mounting()[:3, :3], np.zeros(3)),
-                    "The rotation is right, but `translation_lsq` was given the identity: it needs the R just found.",
+                    "The rotation is right. The translation comes out so with the identity for R: `translation_lsq` needs the R just found.",
                     id="mounting-identity",
                 ),
                 Mistake(
                     _from_pose_to_pose,
-                    "This comes out of the motions from each pose to the next. They are shorter, and the report takes all from pose 0.",
+                    "This comes out of the motions from each pose to the next. The report takes all from pose 0, as `A` and `B` are.",
                     id="mounting-f9cf46",
                 ),
                 Mistake(
@@ -1980,9 +1984,10 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         _least(_around, between),
-                        "np.roll brings the end of the curve back in at its beginning. Compare only the part both curves share.",
+                        "The end of the curve comes back in at its beginning, as by `np.roll` or an FFT. Compare only the part both curves share.",
+                        id=f"time_offset-af621c{also}",
                     )
-                    for between in (True, False)
+                    for between, also in ((True, ""), (False, "-2"))
                 ),
                 *(
                     Mistake(
