@@ -254,11 +254,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _blocks(lambda R: R, -np.ones((3, 3))),
-                    "`np.ones` fills the whole block; the identity matrix is `np.eye(3)`.",
+                    "The block of the pivot is filled with -1. The identity matrix, `np.eye(3)`, has its ones on the diagonal alone.",
+                    id="pivot_matrix-8b2b87",
                 ),
                 Mistake(
                     _side_by_side,
-                    "You set the poses side by side. Each pose adds equations, not unknowns: stack them beneath each other.",
+                    "The poses stand side by side here, and -I beneath R. Each pose adds equations, not unknowns: R and -I belong side by side, and the rows of the poses beneath each other.",
+                    id="pivot_matrix-49c597",
                 ),
                 Mistake(
                     lambda T_WF: pivot.pivot_matrix(T_WF).reshape(-1, 3, 6).swapaxes(0, 1).reshape(-1, 6),
@@ -281,7 +283,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _blocks(lambda R: R.T, np.eye(3)),
-                    "Two slips: you took Rᵀ instead of R, and the pivot enters with -I.",
+                    "Two slips: Rᵀ stands where R belongs, and I where -I belongs.",
+                    id="pivot_matrix-98075a",
                 ),
                 Mistake(
                     _blocks(lambda R: -R, -np.eye(3)),
@@ -307,7 +310,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda T_WF: np.vstack([np.hstack([T[:3], -np.eye(3)]) for T in T_WF]),
-                    "Your rows have seven entries: T[:3] holds the position as well. R is T[:3, :3]; p goes to the right-hand side.",
+                    "Your rows have seven entries: the position stands between R and -I, as it does in T[:3]. R is T[:3, :3]; p goes to the right-hand side.",
+                    id="pivot_matrix-90d825",
                 ),
                 Mistake(
                     lambda T_WF: pivot.pivot_matrix(T_WF[:1]),
@@ -344,7 +348,8 @@ CHAPTER = Chapter(
                 Mistake(lambda T: -T[:, :3, 3], "The numbers are right; flatten them into one vector, pose by pose."),
                 Mistake(
                     lambda T: -T[:, 3, :3].ravel(),
-                    "All zeros: nothing was filled in, or you took the last row of each pose. The position stands in the last column.",
+                    "All zeros. Was nothing filled in, or the last row of each pose taken? The position stands in the last column.",
+                    id="pivot_rhs-3a4e58",
                 ),
                 Mistake(
                     lambda T: -T[:, :, 3].ravel(),
@@ -352,7 +357,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda T: -np.einsum("nji,nj->ni", T[:, :3, :3], T[:, :3, 3]).ravel(),
-                    "You turned the positions into the tool frame (Rᵀp). The equations are written in the world.",
+                    "These are the positions turned into the tool frame, -Rᵀp, as in the inverse of a pose. The equations are written in the world: -p.",
+                    id="pivot_rhs-1ce2c7",
                 ),
                 Mistake(
                     lambda T: -np.einsum("nij,nj->ni", T[:, :3, :3], T[:, :3, 3]).ravel(),
@@ -418,7 +424,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, b: np.linalg.pinv(A, rcond=0.1) @ b,
-                    "You drop singular values below a tenth of the largest. Narrow poses have such small ones, and they count.",
+                    "Small singular values are dropped here, such as lie a little below a tenth of the largest. Narrow poses have them, and they count.",
                     id="solve-cut",
                 ),
                 Mistake(
@@ -440,7 +446,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _tip_alone,
-                    "You solved for the tip alone. The pivot is unknown too, and it takes up most of what you explain by the tip.",
+                    "The tip is fitted here as if the pivot were at 0. Its place is unknown too: solve for all six at once.",
+                    id="solve_pivot-c929a6",
                 ),
                 Mistake(
                     lambda A, b: np.linalg.lstsq(A, b, rcond=None)[0][[3, 4, 5, 0, 1, 2]],
@@ -460,7 +467,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, b: (A.T @ A) ** -1.0 @ A.T @ b,
-                    "`** -1` takes the reciprocal of every entry. The inverse matrix is `np.linalg.inv(A.T @ A)`.",
+                    "Every entry of AᵀA is inverted by itself, as by `** -1`. The inverse matrix is `np.linalg.inv(A.T @ A)`.",
+                    id="solve_pivot-690105",
                 ),
                 Mistake(
                     lambda A, b: pivot.solve_pivot(A, b)[:3],
@@ -472,7 +480,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, b: np.linalg.solve(A.T @ A + np.eye(6), A.T @ b),
-                    "Something is added to AᵀA, which pulls the solution toward 0. Least squares solves AᵀA x = Aᵀb as it is.",
+                    "Your solution is pulled toward 0, as by I added to AᵀA, or |x|² to the sum of squares. Least squares solves AᵀA x = Aᵀb as it is.",
                     id="solve-ridge",
                 ),
                 Mistake(
@@ -482,7 +490,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, b: np.abs(np.linalg.lstsq(A, b, rcond=None)[0]),
-                    "The signs have got lost: tip and pivot have coordinates of both signs.",
+                    "The signs have got lost: a coordinate of tip or pivot may be negative.",
                     id="solve-abs",
                 ),
                 Mistake(
@@ -571,7 +579,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.abs(_kreisel().tip).mean(),
-                    "This is the mean of the three components. The length is the root of the sum of their squares.",
+                    "This is the mean of the three components' absolute values. The length is the root of the sum of their squares.",
                     id="tip-mean",
                 ),
                 Mistake(
@@ -683,7 +691,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda T, tip, point: T @ np.append(tip, 1.0) - np.append(point, 1.0),
-                    "Your rows have four entries: the last is the 1 of the homogeneous point. Drop it.",
+                    "Your rows have four entries: the last is 0, the difference of two homogeneous points' 1. Drop it.",
+                    id="pivot_residuals-514833-2",
                 ),
                 Mistake(
                     lambda T, tip, point: np.abs(pivot.pivot_residuals(T, tip, point)),
@@ -691,7 +700,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda T, tip, point: np.square(pivot.pivot_residuals(T, tip, point)),
-                    "The sign of each component has got lost: the residual is a vector.",
+                    "These are the squares of the components. The residual is a vector: its components as they are, with their signs.",
+                    id="pivot_residuals-ffa6a5-2",
                 ),
                 Mistake(
                     lambda T, tip, point: T[:, :3, :3] * tip + T[:, None, :3, 3] - point,
@@ -870,7 +880,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _covariance(lambda r, n: r @ r / (n - 2)),
-                    "You took two off the number of poses, as two points are unknown. Counted in numbers, 3n - 6 remain: you have three times that.",
+                    "Your covariance is three times the right one, as if rᵀr were divided by n - 2, the poses less two. Counted in numbers, 3n - 6 remain.",
                     id="covariance-n-2",
                 ),
                 Mistake(
@@ -1002,7 +1012,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda distances, scale: np.maximum(1 - (distances / pivot.TUKEY * scale) ** 2, 0) ** 2,
-                    "`d / 7 * scale` divides by 7 and multiplies by the scale: put 7 * scale in parentheses.",
+                    "The scale multiplies here, as in `d / 7 * scale`. It divides: q = d / (7 scale).",
+                    id="robust_weights-18a384",
                 ),
                 Mistake(
                     _weights(lambda q: np.where(q > 1, (1 - q**2) ** 2, 0.0)),
@@ -1032,7 +1043,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda distances, scale: np.maximum(1 - (distances / scale * pivot.TUKEY) ** 2, 0) ** 2,
-                    "`d / scale * 7` multiplies by 7: put 7 * scale in parentheses.",
+                    "The 7 multiplies here, as in `d / scale * 7`. It divides: q = d / (7 scale).",
+                    id="robust_weights-7cabcf",
                 ),
                 Mistake(
                     lambda distances, scale: np.where(
@@ -1050,7 +1062,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _weights(lambda q: np.minimum((1 - q**2) ** 2, 1.0)),
-                    "Beyond the cutoff a pose has no weight: 0, not 1.",
+                    "Beyond the cutoff your weights grow again, up to 1: they must be 0 where q > 1.",
+                    id="robust_weights-29036c-2",
                 ),
                 Mistake(
                     _weights(lambda q: (lambda w: w / w.sum())(np.maximum(1 - q**2, 0) ** 2)),
@@ -1074,7 +1087,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _weights(np.vectorize(lambda q: (1 - q**2) ** 2 if q < 1 else 0)),
-                    "`np.vectorize` takes the type of its first result: where that is 0, all weights become whole numbers. Write 0.0.",
+                    "Where the first weight is 0, all of them become whole numbers, as with `np.vectorize`, which takes the type of its first result. Write 0.0.",
+                    id="robust_weights-3109df",
                 ),
                 Mistake(
                     _weights(lambda q: np.maximum(1 - q**4, 0)),

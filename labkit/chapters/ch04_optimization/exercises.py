@@ -696,7 +696,8 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     lambda x: wells.gradient(x) / 2,
-                    "Half of the gradient: the gradient of |x − c|² is 2(x − c), the 2 is missing.",
+                    "Half of the gradient. Is it the 2 in 2(x − c), the gradient of |x − c|², that is missing?",
+                    id="gradient-edcc5c",
                 ),
                 Mistake(
                     lambda x: -wells.gradient(x),
@@ -790,7 +791,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda x: wells.gradient(x) / 100,
-                    "The depths are 100 and 200; here they are 1 and 2.",
+                    "A hundredth of the gradient, as of wells of depths 1 and 2: they are 100 and 200.",
                     id="gradient-depths",
                 ),
                 Mistake(
@@ -818,12 +819,12 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     beyond.differences(lambda f, x, e, h: (f(x + e) - f(x)) / h),
-                    "These are forward differences, off by ½h times the curvature. Step to both sides: f(x + h e) − f(x − h e).",
+                    "These are forward differences, off by about ½h times the curvature. Step to both sides: f(x + h e) − f(x − h e).",
                     id="measured-forward",
                 ),
                 Mistake(
                     beyond.differences(lambda f, x, e, h: (f(x) - f(x - e)) / h),
-                    "These are backward differences, off by ½h times the curvature. Step to both sides: f(x + h e) − f(x − h e).",
+                    "These are backward differences, off by about ½h times the curvature. Step to both sides: f(x + h e) − f(x − h e).",
                     id="measured-backward",
                 ),
                 Mistake(
@@ -833,7 +834,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     beyond.differences(lambda f, x, e, h: (f(x + e) - f(x - e)) / 2 * h),
-                    "`/ 2 * h` divides by 2 and then multiplies by h: write `/ (2 * h)`.",
+                    "The h multiplies here, as in `/ 2 * h`. Divide by both: `/ (2 * h)`.",
                     id="measured-times-h",
                 ),
                 *(
@@ -928,14 +929,19 @@ CHAPTER = Chapter(
                 ),
                 Mistake(_hessian(factor=-8.0), "The outer product has the wrong sign: 1/q² shrinks as q grows."),
                 *_one_well_alone(_hessian, "hessian"),
-                Mistake(_diagonal_only, "The mixed derivatives are not zero: the wells lie diagonally to each other."),
+                Mistake(
+                    _diagonal_only,
+                    "The mixed derivatives are not zero: q holds both offsets, so that each entry of the gradient depends on x1 and on x2.",
+                    id="hessian-4cc8d8",
+                ),
                 Mistake(
                     _hessian(factor=4.0), "The outer product is too small by a factor 2: the gradient of q is 2(x − c)."
                 ),
                 Mistake(_hessian(power=2), "The derivative of 1/q² has q³ in its denominator."),
                 Mistake(
                     _hessian_with(product=np.dot),
-                    "`d @ d` is a number and lowers all four entries alike. The matrix is `np.outer(d, d)`.",
+                    "The number |x − c|², `d @ d`, lowers all four entries alike here. The matrix is `np.outer(d, d)`.",
+                    id="hessian-beb5fa",
                 ),
                 Mistake(
                     _hessian_with(product=lambda a, b: np.dot(a, b) * np.eye(2)),
@@ -952,11 +958,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _hessian_with(wells_seen=(1,)),
-                    "This is the last well alone: the wells add up, `H += ...` and not `H = ...`.",
+                    "This is the well at (−1, −2) alone: add the one at (1, 1). In a loop over both that is `H += ...`, not `H = ...`.",
+                    id="hessian-2e0183",
                 ),
                 Mistake(
                     _hessian_with(wells_seen=(0,)),
-                    "This is the first well alone: add the one at (−1, −2). A `return` inside the loop ends it too early.",
+                    "This is the well at (1, 1) alone: add the one at (−1, −2). A `return` inside a loop ends it too early.",
+                    id="hessian-7f0d15",
                 ),
                 Mistake(
                     _hessian(factor=2.0),
@@ -995,17 +1003,17 @@ CHAPTER = Chapter(
                 *_wide_differences("hessian", wells.gradient, (0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6), (0.1, 0.01, 1e-3)),
                 Mistake(
                     lambda x: wells.hessian(x) / 2,
-                    "Half of the Hessian: the 2 of 2(x − c) is missing in both terms, or you took the Hessian of ½|r|², which is f/2 but for a constant.",
+                    "Half of the Hessian. Is a 2 missing in both terms? Or is it the Hessian of ½|r|², which is f/2 but for a constant?",
                     id="hessian-half",
                 ),
                 Mistake(
                     lambda x: wells.jacobian(x).T @ wells.jacobian(x),
-                    "This is JᵀJ, the matrix of Gauss-Newton. The Hessian also holds what the second derivatives add.",
+                    "This is JᵀJ, the matrix of Gauss-Newton. The Hessian of f is twice that, and what the second derivatives of the residuals add.",
                     id="hessian-gauss-newton",
                 ),
                 Mistake(
                     lambda x: 2 * wells.jacobian(x).T @ wells.jacobian(x),
-                    "This is 2JᵀJ, what Gauss-Newton takes for it. The Hessian also holds what the second derivatives add.",
+                    "This is 2JᵀJ, what Gauss-Newton takes for it. The Hessian also holds what the second derivatives of the residuals add.",
                     id="hessian-gauss-newton-2",
                 ),
                 Mistake(
@@ -1047,14 +1055,14 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _kind_before_slope(("saddle",)),
-                    "You look for the saddle before you look at g. Where the gradient does not vanish, the point is no saddle either, "
-                    'however f bends: "not stationary" comes first.',
+                    'Wherever H bends both ways you say "saddle", whatever g is. Where the gradient does not vanish, the point is no saddle either: '
+                    '"not stationary" comes first.',
                     id="classify-order-saddle",
                 ),
                 *(
                     Mistake(
                         _kind_before_slope(early),
-                        "You look at H before you look at g. Where the gradient does not vanish, the signs of the eigenvalues decide "
+                        "At some places H alone decides here, whatever g is. Where the gradient does not vanish, the signs of the eigenvalues decide "
                         'nothing: "not stationary" comes first.',
                         id=f"classify-order-{k}",
                     )
@@ -1064,7 +1072,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _stationary(_by(np.linalg.eigvalsh), lambda g: g @ g > 1e-6),
-                    "In effect your limit for |g| is 1e-3, not 1e-6. If you compare `g @ g` with 1e-6: that is the square of the length, take its root first.",
+                    "In effect your limit for |g| is about 1e-3, not 1e-6. If you compare `g @ g` with 1e-6: that is the square of the length, take its root first.",
                     id="classify-square",
                 ),
                 Mistake(
@@ -1107,7 +1115,8 @@ CHAPTER = Chapter(
                 Mistake(_first_order_only, "A vanishing gradient is necessary, not sufficient: a saddle has one too."),
                 Mistake(
                     _stationary(_by(np.diag)),
-                    "The diagonal of H bends up in both coordinates and it can still be a saddle: use the eigenvalues.",
+                    "At a saddle both entries on the diagonal of H may have the same sign: use the eigenvalues.",
+                    id="classify_extremum-e3629d",
                 ),
                 Mistake(
                     _stationary(_by(np.trace)),
@@ -1115,7 +1124,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _stationary(_by(np.linalg.eigvalsh), lambda g: g.any()),
-                    "After an iteration the gradient is never exactly 0: up to a norm of 1e-6 it counts as vanished (`np.allclose` stops at 1e-8).",
+                    "After an iteration the gradient is hardly ever exactly 0: up to a norm of 1e-6 it counts as vanished.",
+                    id="classify_extremum-02713b",
                 ),
                 Mistake(
                     _stationary(_by(np.linalg.eigvalsh), lambda g: np.abs(g).sum() > 1e-6),
@@ -1128,7 +1138,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _stationary(_by(lambda H: (lambda e: np.where(abs(e) < 1e-6, 0.0, e))(np.linalg.eigvalsh(H)))),
-                    "Small eigenvalues count as 0 here. None is 0, however faintly f bends: the sign of each tells.",
+                    "In effect small eigenvalues count as 0 here. None is 0, however faintly f bends: the sign of each tells.",
                     id="kind-eigenvalues-cut-off",
                 ),
                 Mistake(
@@ -1249,7 +1259,7 @@ CHAPTER = Chapter(
                 Mistake(lambda g, H: -g, "That is steepest descent: H is not used at all."),
                 Mistake(
                     lambda g, H: -(g @ g) / (g @ H @ g) * g,
-                    "This is the stationary point of the model along g alone, a step of steepest descent. Newton's step solves H h = −g: in all directions at once.",
+                    "This is the stationary point of the model along g alone. Newton's step solves H h = −g: in all directions at once.",
                     id="newton-along-g",
                 ),
                 Mistake(
@@ -1271,12 +1281,12 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda g, H: np.linalg.solve(H, g).reshape(2, 1),
-                    "This is a column, shape (2, 1), and its sign is reversed. Leave g as it is, shape (2,).",
+                    "This is a column, shape (2, 1), and its sign is reversed. The step has the shape of g, (2,).",
                     id="newton-column-plus",
                 ),
                 Mistake(
                     lambda g, H: -np.linalg.solve(H, g).reshape(2, 1),
-                    "The numbers are right, in a column of shape (2, 1). Leave g as it is, shape (2,).",
+                    "The numbers are right, in a column of shape (2, 1). The step has the shape of g, (2,).",
                     id="newton-column",
                 ),
             ],
@@ -1373,7 +1383,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     beyond.chords(lambda t, v, c: (c - v).max()),
-                    "That is how far f sags below its chord. It should do that; asked for is how far it rises above, f − chord.",
+                    "That is how far f sags below its chord, as a convex f does. Asked for is how far it rises above, f − chord.",
                     id="chord-below",
                 ),
                 Mistake(
@@ -1490,7 +1500,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _jacobian(lambda d, q: 2 * np.outer(d, d) / q),
-                    "The outer product is twice too large: the root has the derivative ½ w/q² divided by √(w/q), times 2(x − c).",
+                    "The outer product is twice too large: the root has the derivative −½ w/q² divided by √(w/q), times 2(x − c).",
                     id="jacobian-twice",
                 ),
                 Mistake(
@@ -1524,6 +1534,11 @@ CHAPTER = Chapter(
                     id="jacobian-order",
                 ),
                 Mistake(
+                    lambda x: wells.jacobian(x)[[0, 2, 1, 3]],
+                    "The rows of the two wells take turns. Both rows of the well at (1, 1) come first, then both of the other one.",
+                    id="jacobian-in-turns",
+                ),
+                Mistake(
                     lambda x: wells.jacobian(x).T,
                     "This is the transpose: one row a residual, one column an unknown, shape (4, 2).",
                     id="jacobian-transpose",
@@ -1555,7 +1570,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda x: _jacobian_with(x, product=lambda d: d @ d),
-                    "`d @ d` is a number, and is taken from all four entries. The product of a column and a row is `np.outer(d, d)`.",
+                    "The number |x − c|², `d @ d`, is taken from all four entries. The product of a column and a row is `np.outer(d, d)`.",
                     id="jacobian-inner",
                 ),
                 Mistake(
@@ -1643,12 +1658,12 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda r, J, damping: opt.damped_step(r, J, damping**2),
-                    "λ counts squared: beneath J stands √λ I, whose square is the λ I of the normal equations.",
+                    "λ counts squared. In the normal equations stands λ I, and beneath J, who solves by least squares, √λ I.",
                     id="damped-squared",
                 ),
                 Mistake(
                     lambda r, J, damping: opt.damped_step(r, J, np.sqrt(damping)),
-                    "The root of λ stands in the normal equations. There it is λ I; its root stands beneath J.",
+                    "The root of λ counts in place of λ. In the normal equations stands λ I, and beneath J, who solves by least squares, √λ I.",
                     id="damped-root",
                 ),
                 Mistake(
@@ -1663,7 +1678,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda r, J, damping: -np.linalg.solve(J.T @ J - damping * np.eye(J.shape[1]), J.T @ r),
-                    "The damping is subtracted, which makes the step longer. It is added: JᵀJ + λ I.",
+                    "The damping is subtracted. It is added: JᵀJ + λ I.",
                     id="damped-minus",
                 ),
                 Mistake(
@@ -1683,7 +1698,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda r, J, damping: -(J.T @ r) / ((J * J).sum(0) + damping),
-                    "Only the diagonal of JᵀJ is used: the columns of J are not perpendicular.",
+                    "Only the diagonal of JᵀJ is used. The columns of J need not be perpendicular: solve with the whole matrix, JᵀJ + λ I.",
                     id="damped-diagonal",
                 ),
                 Mistake(
@@ -1739,7 +1754,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: abs(cost - new_cost) / _predicted(g, B, step),
-                    "A step that raised the cost has a negative gain: no absolute value, or it would never be taken back.",
+                    "A step that raised the cost has a negative gain: no absolute value, or it may be taken.",
+                    id="gain_ratio-4a94e8",
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: (cost - new_cost) / (cost - _predicted(g, B, step)),
@@ -2054,12 +2070,12 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     beyond.loop(follow=functools.partial(beyond.rule, good=0.9)),
-                    "Your radius doubles above 0.9 only. The rule says ¾.",
+                    "After some steps to the rim whose ρ is above ¾ your radius does not double. It does after each of them.",
                     id="region-nine-tenths",
                 ),
                 Mistake(
                     beyond.loop(weight=1.0),
-                    "Your gain ratios are twice too large: g = Jᵀr and B = JᵀJ belong to the cost ½ rᵀr. Hand `gain_ratio` half of r @ r.",
+                    "Your gain ratios are twice too large: g = Jᵀr and B = JᵀJ belong to the cost ½ rᵀr, half of r @ r.",
                     id="region-cost",
                 ),
                 Mistake(
@@ -2199,7 +2215,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: 5 * 0.5**4,
-                    "Adding up counts those cases several times where more than one stand-in is right.",
+                    "This is five times ½⁴. Adding up counts those cases several times where more than one stand-in is right.",
+                    id="luck-e6d3d2",
                 ),
                 Mistake(lambda: (1 - 0.5**4) ** 5, "That is the probability that none of the five is right."),
                 Mistake(
@@ -2287,10 +2304,17 @@ CHAPTER = Chapter(
                     "That is where both draw level if taking the data, the third criterion, is weighted. Solving is the last one.",
                     id="tipping-third",
                 ),
-                Mistake(
-                    lambda: 26 / 22,
-                    "That is the ratio of the sums. The weight stands in front of one criterion, on both sides.",
-                    id="tipping-ratio",
+                *(
+                    Mistake(
+                        lambda one=one, other=other: one / other,
+                        "That is the ratio of two sums. The weight stands in front of one criterion, on both sides.",
+                        id=id,
+                    )
+                    for one, other, id in (
+                        (26, 22, "tipping-ratio"),
+                        (22, 26, "tipping-ratio-inverse"),
+                        (26, 16, "tipping-ratio-to-the-least"),
+                    )
                 ),
                 Mistake(
                     lambda: 26 - 22,
@@ -2324,7 +2348,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: beyond.tipping_weight() / (beyond.tipping_weight() + 3),
-                    "That is the share of all weights that w has, w / (w + 3). Asked for is w, beside three weights of 1.",
+                    "That is 3/8, the ratio of the points for solving, and also w / (w + 3), the share of all weights that w has. Asked for is w, beside three weights of 1.",
                     id="tipping-share",
                 ),
                 Mistake(
