@@ -207,6 +207,15 @@ class Explanations(Named):
         named = words and words.partition(":")[0] in names
         return f" {words if named else words[0].upper() + words[1:]}." if words else ""
 
+    def _one_shape(self):
+        """That results have one shape where expected ones have several, some of them smaller, as one more sentence."""
+        pairs = [(numbers_of(result), rerun.numeric(expected)) for result, expected in self._plain_pairs()]
+        if any(r is None or e is None or r.ndim != e.ndim for r, e in pairs):
+            return ""
+        one = len({r.shape for r, _ in pairs}) == 1 < len({e.shape for _, e in pairs})
+        larger = any(r.size > e.size for r, e in pairs)
+        return " It has this shape on every draw, whatever is given: is a size typed in?" if one and larger else ""
+
     def _unmoved(self):
         """An argument that makes no difference to the results, though it should."""
         draws = self._cases()

@@ -79,7 +79,7 @@ def _relation(metric, results, expected, sizes, whole):
     words = (
         _sign_or_unit(holds, "rad" if isinstance(metric, Angles) else unit)
         or _without_sign(metric, results, expected)
-        or _arrangement(results, holds)
+        or _arrangement(results, expected, holds)
         or _power(results, holds)
         or _factor(results, expected, sizes)
     )
@@ -253,7 +253,7 @@ def _thousand(unit):
     return f": {units[unit]}?" if unit in units else ""
 
 
-def _arrangement(results, holds):
+def _arrangement(results, expected, holds):
     """Right entries in another order."""
     first = results[0]
     if all(r.shape == (4,) for r in results) and holds(lambda r: np.roll(r, -1)):
@@ -265,6 +265,8 @@ def _arrangement(results, holds):
             return "your matrix is the inverse of the expected one"
     oblong = all(r.ndim == 2 and 1 < r.shape[0] != r.shape[1] > 1 for r in results)
     if oblong and holds(lambda r: r.reshape(r.shape[::-1]).T):
+        if all(map(_are_rows_of, results, expected)):  # of such symmetry that a reshape would not tell
+            return "the rows are right, in another order"
         return "the numbers are right, in the order of columns written as rows: is a `reshape` taken for `.T`?"
     if not first.ndim or first.shape[-1] < 2 or any(r.shape[-1:] != first.shape[-1:] for r in results):
         return None
@@ -279,6 +281,12 @@ def _arrangement(results, holds):
         if len(first) > 2 and holds(lambda r, shift=shift: np.roll(r, shift, axis=0)):
             return f"the entries are right, but all stand one place too {'early' if shift > 0 else 'late'}"
     return None
+
+
+def _are_rows_of(result, expected):
+    """Whether an array has the rows of another one, in whichever order."""
+    order = np.abs(result[:, None] - expected).sum(axis=2).argmin(axis=1)
+    return len(set(order)) == len(order) and np.allclose(result, expected[order])
 
 
 def _along(array):

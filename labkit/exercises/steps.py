@@ -714,6 +714,16 @@ class Search:
         name = self.written.places[k][2]
         return any(self._is_filled(j) and self.written.places[j][2] == name for j in range(k, len(self.written.places)))
 
+    def _made_in_another_shape(self, solution):
+        """Places of arrays, filled further down, of a shape that no value of the solution has, nor the right result."""
+        for k in range(len(self.written.places)):
+            if self._is_filled(k) or not self._is_filled_later(k):
+                continue
+            mine = [values[k][1].shape[1:] for values in self.values]
+            theirs = [[values[q][1].shape[1:] for values in solution.values] for q in solution.distinct]
+            if mine not in [[np.shape(case.expected) for case in self.cases], *theirs]:
+                yield k
+
     def _is_bound_again(self, k):
         """Whether a name is bound once more further down, on some draws only or in some rounds only."""
         name = self.written.places[k][2]
@@ -831,7 +841,8 @@ class Search:
             units, right = units[: again.index(True)], right[: again.index(True)]
         known = units[: right.index(False)] if False in right else units
         of_notebook = min(self._of_notebook(), default=len(self.written.places))
-        known = [k for k in known if k < of_notebook]  # what is the same whatever is given may be wrong, and is no unit
+        doubtful = min([of_notebook, *self._made_in_another_shape(solution)])
+        known = [k for k in known if k < doubtful]  # what is the same whatever is given may be wrong, and is no unit
         if not known:
             return None
         names = dict.fromkeys(self._called(k) for k in known if self.written.places[k][2])

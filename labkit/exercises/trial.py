@@ -110,7 +110,7 @@ class Trial(Raised, Staying):
             step = step or nearer or search.partly_words() or search.given_words(solution)
         if self.refusal:
             words = shape or (f" {step[0].upper()}{closed(step[1:])}" if step else "")
-            return self._refused(words or self._agreement(search, solution), mended)
+            return self._refused(words or self._one_shape() or self._agreement(search, solution), mended)
         if step:
             return self.outcome(NOT_YET, closed(step) + self._about_globals())
         if self._right_on_plain():

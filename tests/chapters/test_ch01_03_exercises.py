@@ -325,13 +325,13 @@ def test_a_heading_is_told_that_it_needs_a_mark():
 
 
 def test_zeros_are_not_taken_for_the_last_row_alone():
-    assert "nothing was filled in" in judged("pivot_rhs", lambda T: np.zeros(3 * len(T))).text
+    assert "nothing filled in" in judged("pivot_rhs", lambda T: np.zeros(3 * len(T))).text
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_small_singular_values_count(seed):
     outcome = judged("solve_pivot", lambda A, b: np.linalg.pinv(A, rcond=0.1) @ b, seed)
-    assert outcome.status == NOT_YET and "drop singular values" in outcome.text
+    assert outcome.status == NOT_YET and "singular values are dropped" in outcome.text
 
 
 def test_the_worst_direction_is_the_one_an_optimizer_finds():
@@ -1184,3 +1184,14 @@ def test_no_direction_is_too_bad_to_be_told_of():
     for part in (0.1, 0.6, 0.9, 0.98, 0.995):
         assert "One of the six axes" in item.judge(part * on_axes).text
         assert "try more of them" in item.judge(on_axes + part * (15.52 - on_axes)).text
+
+
+def test_rows_of_so_many_poses_that_are_typed_in():
+    def matrix(T_WF):
+        A = np.zeros((36, 6))
+        for i in range(min(12, len(T_WF))):
+            A[3 * i : 3 * i + 3] = np.hstack([T_WF[i, :3, :3], -np.eye(3)])
+        return A
+
+    told = judged("pivot_matrix", matrix).text
+    assert told.endswith("is a size typed in?") and "As far as" not in told

@@ -13,6 +13,7 @@ RNG = np.random.default_rng(4)
 VECTORS = [RNG.normal(size=4) + 3 for _ in range(4)]
 TABLES = [RNG.normal(size=(5, 3)) for _ in range(4)]
 SQUARES = [RNG.normal(size=(3, 3)) for _ in range(4)]
+OF_SYMMETRIC_BLOCKS = [np.vstack([S + S.T for S in RNG.normal(size=(2, 2, 2))]) for _ in range(4)]
 TURNS = [exp_so3(RNG.normal(size=3)) for _ in range(4)]
 
 
@@ -44,6 +45,8 @@ def changed(index, value):
         (lambda e: e[[2, 1, 0, 3]], VECTORS, "the entries 0 and 2 (counted from 0) are exchanged"),
         (lambda e: e[:, [1, 0, 2]], TABLES, "the entries 0 and 1 (counted from 0) are exchanged in each row"),
         (lambda e: np.roll(e, 1, axis=0), TABLES, "one place too late"),
+        (lambda e: e[[0, 2, 1, 3]], OF_SYMMETRIC_BLOCKS, "the rows are right, in another order"),
+        (lambda e: e.T.reshape(e.shape), TABLES, "in the order of columns written as rows"),
         (changed(3, lambda v: v + 5.0), VECTORS, "only entry 3 (counted from 0) is not right: it is off by 5 mm"),
         (changed(slice(3, None), 0.0), TABLES, "the first 3 rows are right"),
         (changed(slice(1, None), 0.0), TABLES, "the first row is right, not all behind it are"),

@@ -484,6 +484,15 @@ def test_what_has_no_counterpart_or_lacks_a_factor_is_not_said_to_be_first(bound
     assert search.agreement_words(solution) == "As far as `u` (line 2) your values are those of the solution"
 
 
+@pytest.mark.parametrize("size, last", [(5, "`x` (line 2)"), (3, "`x`, `y`")])
+def test_behind_an_array_of_a_size_of_its_own_nothing_is_said_to_agree(size, last):
+    body = f"x = a * b\nu = np.zeros({size})\ny = a - b\nu[:3] = np.sinh(x) * y\nreturn u"
+    search = steps.search(typed(body), ["a", "b"], _cases(), None, Budget(1.0))
+    right = typed("x = a * b\ny = a - b\nreturn x[0] * y[1] + b[2]")
+    solution = steps.Solution(rerun.written(right), search.cases, Budget(1.0))
+    assert f"As far as {last}" in search.agreement_words(solution)
+
+
 def test_an_angle_that_is_wrapped_is_that_of_the_solution():
     rng = np.random.default_rng(0)
     draws = [(rng.normal(size=3), rng.uniform(1, 2, 3)) for _ in range(4)]
