@@ -612,7 +612,7 @@ def _finer(function):
                 rounds = given[0].value
                 for more in (max(10 * rounds, ROUNDS), 100 * rounds)[: 2 if rounds >= ITERATION else 1]:
                     number = ast.copy_location(ast.Constant(more), given[0])
-                    mends = f"these are too few rounds: {more} will do"
+                    mends = f"these are too few rounds: on all draws here {more} will do"
                     yield Change("", mends, FINER, owner.iter, ((owner.iter, "args", [number]),))
 
 
@@ -754,8 +754,8 @@ def _is_second(node):
 
 
 def _typed_numbers(function):
-    """Numbers that are typed in, changed to an argument that is read nowhere, to the size of one, or to radians; a
-    number that stands in several places is changed in all of them as well.
+    """Numbers that are typed in, changed to an argument that is read nowhere, to the size of one, or to radians, and
+    factors and entries such as 0.1 to any argument; a number that stands in several places is changed in all of them.
     """
     given = [argument.arg for argument in function.args.args]
     read = {n.id for n in ast.walk(function) if isinstance(n, ast.Name)}
@@ -764,6 +764,8 @@ def _typed_numbers(function):
         counts = type(node.value) is int and node.value > 1 and not _is_no_count(owner)
         sizes = [form.format(name) for name in given for form in SIZES if counts]
         turns = [TURNS[node.value]] if node.value in TURNS else []
+        factor = isinstance(getattr(owner, "op", None), ast.Mult | ast.Div) or isinstance(owner, ast.List | ast.Tuple)
+        sizes += [name for name in given if factor and node.value % 0.5 and name in read]
         for text in (*unread, *turns, *sizes):
             new = ast.copy_location(ast.parse(text, mode="eval").body, node)
             _locate(new, node)

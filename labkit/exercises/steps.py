@@ -44,7 +44,7 @@ BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with 
 UNBOUNDED = {f"`{name}` is too much" for name in mutation.BOUNDED | mutation.BOUNDS}
 DECIMALS = re.compile(r"[<>]=? *\d*(\.\d+(e[+-]?\d+)?|e-\d+)$|[<>]=? *\d+e-\d+$")  # a comparison with such a number
 NEARER = {  # what brings a result nearer on every draw, and what is said where it is not there yet
-    re.compile("these are too few rounds: (.+) will do"): (
+    re.compile("these are too few rounds: on all draws here (.+) will do"): (
         "with {} rounds {}. Go on until nothing changes, or choose what needs no rounds"
     ),
     re.compile("rounding shows where a step is as short as this: (.+) will do"): (

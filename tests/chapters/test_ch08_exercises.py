@@ -479,7 +479,7 @@ def in_degrees_and_half_of_what_is_large(x0, cov0, z, C, cov_z):
         ),
         ("gate", lambda y, S, limit: bool((y**2 < limit * np.diag(S)).all()), "Each number is judged by itself"),
         ("wrap_angle", lambda a: np.fmod(a + np.pi, 2 * np.pi) - np.pi, "An angle below -pi ends below -pi"),
-        ("steady_state_gain", twenty_rounds, "these are too few rounds: 400 will do"),
+        ("steady_state_gain", twenty_rounds, "these are too few rounds: on all draws here 400 will do"),
         ("predict_state", scaled_by_the_control, "`U = np.diag(u)`: the identity belongs on the right side"),
         (
             "fuse_two_sensors",

@@ -1008,6 +1008,7 @@ def _up_to_above(a, b):
             "`180`: 180 is typed in where `np.pi` belongs",
         ),
         (lambda a, b: a.sum() * b, "return a.sum() * 1.5", "`1.5`: 1.5 is typed in where `b` belongs"),
+        (lambda a, b: a.sum() * b + b, "return 0.3 * a.sum() + b", "`0.3`: 0.3 is typed in where `b` belongs"),
         (
             lambda a, b: np.sum(a**2) / len(a) + np.exp(len(a) - b[0]),
             "return np.sum(a**2) / 7 + np.exp(7 - b[0])",
@@ -1253,7 +1254,7 @@ SOLVED = asked(np.linalg.solve, two_equations)
         ),
         (
             "x = np.zeros(2)\nfor _ in range(20):\n    x = x - 0.05 * a.T @ (a @ x - b)\nreturn x",
-            "`range(20)`: these are too few rounds: 2000 will do",
+            "`range(20)`: these are too few rounds: on all draws here 2000 will do",
         ),
         (
             "x = np.zeros(2)\nfor _ in range(5):\n    x = x - 0.02 * a.T @ (a @ x - b)\nreturn x",
