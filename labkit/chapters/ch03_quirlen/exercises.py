@@ -741,7 +741,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: _kreisel().std,
-                    "This is the unbiased estimate, divided by 3n - 6. A better number, but not the sheet's s0.",
+                    "This is the unbiased estimate of one coordinate's noise, divided by 3n - 6. The sheet divides by the 12 poses.",
+                    id="s0-63aa00",
                 ),
                 Mistake(
                     lambda: np.sqrt(_squares() / 11),
@@ -848,7 +849,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, r: (r**2).sum() / (r.size - 6) * np.diag(1 / np.diag(A.T @ A)),
-                    "This is the variance times the reciprocals of the diagonal of AᵀA. The inverse of a matrix is another thing: `np.linalg.inv(A.T @ A)`.",
+                    "This is the variance times the reciprocals of the diagonal of AᵀA, as if tip and pivot had nothing to do with each other. Invert the whole matrix: `np.linalg.inv(A.T @ A)`.",
                     id="covariance-of-reciprocals",
                 ),
                 Mistake(
