@@ -116,12 +116,15 @@ class Evidence:
         return () if kind == "given" else self._fresh
 
     def _judging(self):
-        return own_steps.Judging(self._fresh_cases, self._has_properties)
+        whole = functools.partial(self._has, properties=(self.exercise.whole,))
+        return own_steps.Judging(
+            self._fresh_cases, functools.partial(self._has, properties=self.exercise.properties), whole
+        )
 
-    def _has_properties(self, function):
-        """Whether a changed function has the properties asked for, which are part of the judgment."""
+    def _has(self, function, properties):
+        """Whether a changed function has properties that are part of the judgment."""
         try:
-            return not any(holds(function, np.random.default_rng(0)) for holds in self.exercise.properties)
+            return not any(holds(function, np.random.default_rng(0)) for holds in properties)
         except Exception:  # what fails has not got them
             return False
 

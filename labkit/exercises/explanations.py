@@ -2,6 +2,7 @@
 
 import copy
 import dis
+import functools
 import types
 
 import numpy as np
@@ -47,7 +48,10 @@ class Explanations(Named):
             return None
         arrays = [arg for args in self.inputs for arg in args if isinstance(arg, np.ndarray)]
         sizes = {n for array in arrays for n in (*array.shape, array.size)}
-        words = relations.difference_words(self.exercise.metric, self._plain_pairs(), sizes, whole)
+        tell = functools.partial(relations.difference_words, self.exercise.metric, sizes=sizes, whole=whole)
+        words = tell(self._plain_pairs())
+        fresh = [pair for *_, pair in self._fresh_results if not isinstance(pair[0], Refusal)] if words else []
+        words = tell(self._plain_pairs() + fresh) if fresh else words
         return words if words is None or has_loop(self.function) else words.replace(relations.LOOP, "")
 
     def _other_arguments(self):

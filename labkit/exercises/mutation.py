@@ -777,7 +777,8 @@ def _typed_numbers(function):
     for (number, text), group in alike.items():
         if sets := _together(group):
             mends = f"{number} is typed in where `{text}` belongs, here and where it stands again"
-            yield Change("", mends, TYPED, group[0].place, sets)
+            first = min((change.place for change in group), key=lambda node: (node.lineno, node.col_offset))
+            yield Change("", mends, TYPED, first, sets)
 
 
 def _is_no_count(owner):

@@ -19,23 +19,28 @@ WORDLESS = {  # what is raised without a word
     MemoryError: "your code asks for more memory than there is",
     KeyboardInterrupt: "the check was interrupted",
 }
+OF_ARRAYS = "|".join(name for name in dir(np.ndarray) if name not in dir(list))
 ADVICE = {  # what NumPy means, by a regular expression
     r"string to float: .*'[-+\d]*,": "`float` reads 1.5, but not 1,5: replace a decimal comma by a point first.",
     "must be square": "`solve`, `inv` and `det` take square matrices; `lstsq` takes more equations than unknowns.",
-    "Singular matrix": "The equations do not fix all unknowns: is one missing, or there twice? Has a loop run off?",
+    "Singular matrix": "Its rows depend on one another: is one missing, 0, or there twice? Has a loop run off?",
     "Incompatible dimensions": "`lstsq` needs as many numbers on the right as the matrix has rows: see `.ravel()`.",
-    "mismatch in its core dimension": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
+    "^matmul: .*core dimension": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
+    "^solve: .*core dimension": "The right side needs as many rows as the matrix.",
     "not aligned": "The inner sizes must agree, (n, k) @ (k, m); rows of vectors take `v @ R.T`.",
     "can be converted to Python scalars": "`math` and `float` take one number; `np.sin` and the like take arrays.",
-    "inhomogeneous": "The parts of this array have different lengths.",
-    "return arrays must be of ArrayType": "`np.arctan` writes into what it is handed second: is `np.arctan2` meant?",
-    "truth value of an array": "`if` takes one truth value; `np.where` chooses entry by entry.",
+    "inhomogeneous": "The parts of this array differ in shape.",
+    "return arrays must be of ArrayType": "`np.arctan` and the like write the result into what is handed over last; "
+    "`np.arctan2` takes two numbers.",
+    "truth value of an array": "`if`, `and`, `max` and the like take one truth value; `np.where`, `&`, `np.maximum` go "
+    "entry by entry.",
     "bitwise_xor": "`^` is no power in Python: write `**`.",
     r"for \^: ": "`^` is no power in Python: write `**`.",
     r"out of bounds for axis .* \d+$": "Indices count from 0; of a matrix the row comes first: [row, column].",
-    "math domain error": "A root of a negative number, or an arccosine beyond 1, perhaps by rounding: see `np.clip`.",
+    "math domain error": "A root or a logarithm of a negative number, or an arccosine beyond 1, say; where "
+    "rounding alone brings it there, see `np.clip`.",
     "requires a buffer of": "The format and the data differ in length: in `struct`, d takes 8 bytes, f takes 4.",
-    "'list' object has no attribute": "A list is no array: `np.array(...)` makes one of it.",
+    f"'list' object has no attribute '({OF_ARRAYS})'": "A list is no array: `np.array(...)` makes one of it.",
     "float' object has no attribute": "Here stands a single number, and no array.",
     "float64' object has no attribute": "Here stands a single number, and no array.",
     "float' object is not subscriptable": "Brackets take an entry out of several: here stands a single number.",
@@ -76,7 +81,7 @@ class Raised(Explanations):
             nowhere = "neither where it is read nor in a cell that has been run since the kernel started"
             return self.outcome(RAISED, f"NameError: `{error.name}` is not known: it is defined {nowhere}.{where}")
         if isinstance(error, RecursionError):
-            return self.outcome(RAISED, "RecursionError: your function calls itself without an end.")
+            return self.outcome(RAISED, "RecursionError: your code calls itself again and again: what ends that?")
         said = run.said or WORDLESS.get(type(error), "" if isinstance(error, AssertionError) else "it says no more")
         if isinstance(error, AssertionError) and not said:
             said = "`assert` raises; an answer is handed over with `return`"

@@ -9,10 +9,9 @@ import itertools
 import numpy as np
 
 from ..geometry import frames
-from ..geometry.lie import log_so3
 from .metrics import Angles, Exactly, Numbers, Poses, Rotations, Several, Through
 
-CLOSE = 1e4  # tolerances: an answer nearer than this is right in kind, but not accurate enough ...
+CLOSE = 1e4  # tolerances: an answer nearer than this is nearly right, but not accurate enough ...
 FAR = 1e-2  # ... unless it is off by more than this: a coarse tolerance leaves no room for less accurate answers
 SHEARED = 1e-3  # from which on RᵀR differs from I by more than rounding
 SIMPLE = 12  # the largest number in a fraction that is worth telling
@@ -178,7 +177,8 @@ def _rotation_relation(results, holds, whole):
     kind = _rotation_kind(results, "matrix")
     if kind:
         return kind
-    if all(np.isfinite(log_so3(r)).all() for r in results) and holds(lambda R: R @ R):
+    near = all((np.trace(r, axis1=-2, axis2=-1) > 1).all() for r in results)  # 90 degrees, and no other half of a turn
+    if near and holds(lambda R: R @ R):
         return "you turn by half the angle"
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1, -1), repeat=3):
@@ -256,7 +256,8 @@ def _thousand(unit):
 def _arrangement(results, expected, holds):
     """Right entries in another order."""
     first = results[0]
-    if all(r.shape == (4,) for r in results) and holds(lambda r: np.roll(r, -1)):
+    unit = all(r.shape == (4,) and abs(np.linalg.norm(e) - 1) < EXACT for r, e in zip(results, expected))
+    if unit and holds(lambda r: np.roll(r, -1)):
         return "the scalar part comes first in your quaternion; here it comes last (x, y, z, w)"
     if all(r.ndim == 2 and r.shape[0] == r.shape[1] > 1 for r in results):
         if holds(np.transpose):
@@ -279,7 +280,8 @@ def _arrangement(results, expected, holds):
                 return f"the entries {i} and {j} (counted from 0) are exchanged{_along(first)}{others}"
     for shift in (1, -1):
         if len(first) > 2 and holds(lambda r, shift=shift: np.roll(r, shift, axis=0)):
-            return f"the entries are right, but all stand one place too {'early' if shift > 0 else 'late'}"
+            told = ("early, the first one last", "late, the last one first")[shift < 0]
+            return f"the entries are right, but stand one place too {told}"
     return None
 
 
@@ -548,10 +550,10 @@ def significant_digits(answer, expected):
 
 
 def not_accurate_enough(deviation):
-    """What to say of an answer that is right in kind; None for one that is farther off."""
+    """What to say of an answer that is nearly right; None for one that is farther off."""
     if deviation.words or deviation.amount > min(CLOSE * deviation.tolerance, FAR):
         return None
     return (
-        f"{deviation}: right in kind, but not accurate enough. Too few iterations, too long or too short a step of "
-        "differences, or a rounded number on the way?"
+        f"{deviation}: nearly right, but not accurate enough. Too few iterations, too long or too short a step of "
+        "differences, an approximation or a rounded number on the way?"
     )

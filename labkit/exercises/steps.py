@@ -61,6 +61,7 @@ NOT_NEEDED = "What you make of it there does not belong in the result"
 FILLED = re.compile(r"\w+(\[.*?\] *[-+*/@%|&]*| *[-+*/@%|&]+)=[^=]")  # a[k] = ..., a += ...
 HANDED_ON = re.compile(r"(\w+ = )?[\w.]+(\[[\w:, -]*\])*$")  # an array or a part of it, as it is
 ALONE = "With this alone changed, your result is right"
+NOT_WHOLE = ", but not for whole numbers yet"
 
 
 def _or_nothing(method):
@@ -165,10 +166,12 @@ class Judging:
 
     more:  function of the kind of change that gives further cases, on which it is tried once more.
     holds: function of the changed function: whether it has the properties that an answer must have.
+    whole: function of the changed function: whether it is right for whole numbers as well.
     """
 
     more: object
     holds: object
+    whole: object
 
 
 class Search:
@@ -182,6 +185,7 @@ class Search:
         self.exactly = all(isinstance(c.metric, metrics.Exactly) for c in self.cases)
         self.chosen = self.exactly and all(type(c.expected) is int for c in self.cases)
         self.turns = any(map(ANGLES.search, written.lines.values()))
+        self.right_for_whole = True
 
     @functools.cached_property
     def overflows(self):
@@ -248,7 +252,14 @@ class Search:
                 raise ValueError("the changed function failed")
             return found[0][0]
 
-        return plan[0] == "given" or self.judging.holds(changed)
+        if plan[0] == "given":
+            return True
+        self.right_for_whole = self.judging.whole(changed)
+        return self.judging.holds(changed)
+
+    def _alone(self):
+        """What is said of the change that was found last."""
+        return ALONE if self.right_for_whole else f"{ALONE}{NOT_WHOLE}"
 
     def _fitting(self, plans, i, budget, values):
         """Whether each plan makes the i-th result right; `values[i]` are those that plans put in other's places."""
@@ -269,7 +280,7 @@ class Search:
         _, line, code, mends = changes[told]
         mends = self._of_truth(mends) + self._if_at_all(told)
         words = self._whatever_words(line, code, mends) or self._weight_words(line, mends)
-        return words or f"in line {line}, `{code}`: {mends}. {ALONE}"
+        return words or f"in line {line}, `{code}`: {mends}. {self._alone()}"
 
     def _of_truth(self, mends):
         """The words of a change to 0 or 1 where True or False is asked for."""
@@ -308,13 +319,8 @@ class Search:
                 continue
             drawn = [values[k][1] for values in self.values]
             among = any(np.ptp(value) for value in drawn)
-            ones = ([("given", k, list(np.ones_like(value)))] for value in drawn)
-            fits = (
-                self.written.results(plans, case.args, self.budget.left(), case.keep)
-                for plans, case in zip(ones, self.cases)
-            )
             differ = among or np.ptp([value.flat[0] for value in drawn]) > 0
-            if differ and all(fit == [True] for fit in fits):
+            if differ and self.mending([("value", k, rerun.ALWAYS_THE_SAME[1], None)]):
                 one = "True" if _is_condition(self.written.places[k][1]) else "1"
                 one = f"{one} everywhere" if among else one
                 return f"{self._where(k)}: with {one} in its place, your result is right, so it is not needed."
@@ -386,9 +392,8 @@ class Search:
         if not any(FILLED.match(places[k][1]) for k in arrays):
             return None
         plan = self.mending([("copy", k) for k in arrays if HANDED_ON.match(places[k][1])])
-        return (
-            plan and f"{self._where(plan[1])}: a copy belongs there, as the array itself is changed later on. {ALONE}"
-        )
+        words = "a copy belongs there, as the array itself is changed later on."
+        return plan and f"{self._where(plan[1])}: {words} {self._alone()}"
 
     def _turned_words(self, plans):
         plan = self.mending(list(plans))
@@ -404,7 +409,7 @@ class Search:
         words = rerun.OF_TRUTHS.get(words, words) if k in self.written.of_truth else words
         words = rerun.OF_ARRAYS.get(words, words) if self._is_array(k) else words
         words = words.replace("belongs in its place", "belongs on the right side") if self._binds(k) else words
-        return f"{self._where(k)}: {_closed(words)} {ALONE}"
+        return f"{self._where(k)}: {_closed(words)} {self._alone()}"
 
     def _is_array(self, k):
         """Whether a place holds arrays: the values noted there come one below the other, a row for every round."""
@@ -439,7 +444,7 @@ class Search:
             constant = rerun.CONSTANTS[words][np.ndim(rerun.numeric(self.cases[0].args[plan[1]])) > 0]
             same = f"the right one is the same whatever `{name}` is"
             return f"with {constant} in the place of `{name}` wherever you read it, your result is right: {same}."
-        return f"wherever you read `{name}`: {_closed(words)} {ALONE}"
+        return f"wherever you read `{name}`: {_closed(words)} {self._alone()}"
 
     def _where(self, k):
         line, code, name, *_ = self.written.places[k]
@@ -650,7 +655,7 @@ class Search:
         read, changes = self.written.of_notebook, self.written.changes
         parts = (k for k, (*_, mends) in enumerate(changes) if TOO_MANY in mends)
         plan = self.mending([("code", k) for k in parts if read & set(NAMES.findall(changes[k][2]))])
-        return plan and "in line {1}, `{2}`: {3}. {told}".format(*changes[plan[1]], told=ALONE)
+        return plan and "in line {1}, `{2}`: {3}. {told}".format(*changes[plan[1]], told=self._alone())
 
     def _is_no_step(self, k):
         """Whether the right result in a value's place says nothing: in the result's, and where an iteration goes on or

@@ -185,7 +185,7 @@ class Hostile:
         (endless, NOT_YET, "did not finish within 0.5 s"),
         (endless_with_bare_except, NOT_YET, "did not finish within 0.5 s"),
         (sleeping, NOT_YET, "did not finish within 0.5 s"),
-        (recursive, RAISED, "calls itself without an end"),
+        (recursive, RAISED, "calls itself again and again"),
         (raising, RAISED, "ZeroDivisionError"),
         (leaving, NOT_YET, "calls exit()"),
         (killing, NOT_YET, "os._exit()"),
@@ -338,6 +338,12 @@ def test_general_layer_on_numbers(change, words):
     assert words in outcome.text.lower(), outcome.text
 
 
+@pytest.mark.parametrize("most, told", [(1.5, False), (np.inf, True)])
+def test_a_relation_holds_on_fresh_draws_as_well(most, told):
+    outcome = DOUBLE.judge(lambda v: -2 * v if v.max() < most else 3 * v, np.random.default_rng(0))
+    assert ("right up to its sign" in outcome.text) is told
+
+
 POSE = Exercise(
     "pose",
     reference=lambda T: T.copy(),
@@ -393,11 +399,14 @@ def asserting(v):
     "answer, words",
     [
         (lambda v: np.eye(3) @ np.ones((5, 3)), "The inner sizes must agree"),
-        (lambda v: np.linalg.solve(np.zeros((2, 2)), np.ones(2)), "do not fix all unknowns"),
+        (lambda v: np.linalg.solve(np.zeros((2, 2)), np.ones(2)), "depend on one another"),
+        (lambda v: np.linalg.solve(np.eye(3), np.ones((2, 2))), "as many rows as the matrix"),
+        (lambda v: np.sqrt(v, 2.0), "write the result into"),
+        (lambda v: [1].shape, "no array"),
         (lambda v: np.linalg.lstsq(np.ones((9, 2)), np.ones((3, 3)))[0], "`.ravel()`"),
         (lambda v: math.sin(v), "`np.sin` and the like take arrays"),
-        (lambda v: np.array([[1, 2], [3]]), "different lengths"),
-        (lambda v: v if v > 0 else -v, "`np.where` chooses"),
+        (lambda v: np.array([[1, 2], [3]]), "differ in shape"),
+        (lambda v: v if v > 0 else -v, "go entry by entry"),
         (lambda v: v ^ 2, "write `**`"),
         (lambda v: math.sqrt(-1.0), "np.clip"),
         (lambda v: np.ones((5, 2)) * np.ones(4), "is `@` meant"),

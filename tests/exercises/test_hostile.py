@@ -104,7 +104,7 @@ def swallowing_twice(v):
         (raising(MemoryError()), RAISED, "more memory than there is"),
         (raising(KeyboardInterrupt()), RAISED, "the check was interrupted"),
         (raising(ValueError()), RAISED, "ValueError: it says no more"),
-        (deep, RAISED, "calls itself without an end"),
+        (deep, RAISED, "calls itself again and again"),
         (waiting, NOT_YET, "leave out `async`"),
         (lambda v: 2j * v, NOT_YET, "complex"),
         (swallowing_in_a_loop_of_numpy, NOT_YET, "did not finish within 0.5 s"),

@@ -7,10 +7,11 @@ from labkit.exercises import metrics, relations
 from labkit.exercises.outcome import CORRECT, NOT_YET, Mistake
 from labkit.exercises.value import Value
 from labkit.geometry.frames import matrix_from_kuka
-from labkit.geometry.lie import exp_so3
+from labkit.geometry.lie import exp_so3, log_so3
 
 RNG = np.random.default_rng(4)
 VECTORS = [RNG.normal(size=4) + 3 for _ in range(4)]
+UNITS = [v / np.linalg.norm(v) for v in VECTORS]
 TABLES = [RNG.normal(size=(5, 3)) for _ in range(4)]
 SQUARES = [RNG.normal(size=(3, 3)) for _ in range(4)]
 OF_SYMMETRIC_BLOCKS = [np.vstack([S + S.T for S in RNG.normal(size=(2, 2, 2))]) for _ in range(4)]
@@ -44,7 +45,9 @@ def changed(index, value):
         (changed((slice(None), 2), np.negative), TABLES, "entry 2 (counted from 0) has the opposite sign in each row"),
         (lambda e: e[[2, 1, 0, 3]], VECTORS, "the entries 0 and 2 (counted from 0) are exchanged"),
         (lambda e: e[:, [1, 0, 2]], TABLES, "the entries 0 and 1 (counted from 0) are exchanged in each row"),
-        (lambda e: np.roll(e, 1, axis=0), TABLES, "one place too late"),
+        (lambda e: np.roll(e, 1, axis=0), TABLES, "one place too late, the last one first"),
+        (lambda e: np.roll(e, -1), VECTORS, "one place too early, the first one last"),
+        (lambda e: np.roll(e, 1), UNITS, "the scalar part comes first in your quaternion"),
         (lambda e: e[[0, 2, 1, 3]], OF_SYMMETRIC_BLOCKS, "the rows are right, in another order"),
         (lambda e: e.T.reshape(e.shape), TABLES, "in the order of columns written as rows"),
         (changed(3, lambda v: v + 5.0), VECTORS, "only entry 3 (counted from 0) is not right: it is off by 5 mm"),
@@ -95,6 +98,12 @@ def _askew(R):
 )
 def test_relations_of_rotations(change, told):
     assert told in words(change, TURNS, metrics.Rotations())
+
+
+@pytest.mark.parametrize("more, told", [(0.0, True), (np.pi, False)])
+def test_a_turn_of_which_two_make_the_right_one_may_be_the_other_half(more, told):
+    said = words(lambda R: exp_so3((0.5 + more / np.linalg.norm(log_so3(R))) * log_so3(R)), TURNS, metrics.Rotations())
+    assert (said == "you turn by half the angle") is told
 
 
 @pytest.mark.parametrize("metric, poses", [(metrics.Rotations(), False), (metrics.Poses(), True)])

@@ -122,6 +122,14 @@ def test_the_line_and_the_slip_are_told(right, wrong, said):
         ),
         (
             """
+            x = np.zeros_like(a)
+            x[:] = a / np.linalg.norm(a)
+            return len(b) * np.linalg.norm(b + (b @ x) * x)
+            """,
+            "With this alone changed, your result is right, but not for whole numbers yet.",
+        ),
+        (
+            """
             x = a / np.linalg.norm(a)
             r = b - (b @ x) * x
             if r[0] < 0.3:
@@ -1013,6 +1021,11 @@ def _up_to_above(a, b):
             lambda a, b: np.sum(a**2) / len(a) + np.exp(len(a) - b[0]),
             "return np.sum(a**2) / 7 + np.exp(7 - b[0])",
             "7 is typed in where `len(a)` belongs, here and where it stands again",
+        ),
+        (
+            lambda a, b: np.sum(a**2) / len(a) + np.exp(len(a) - b[0]),
+            "grown = np.exp(-(b[0] - 7))\nreturn np.sum(a**2) / 7 + grown",
+            "in line 2, `7`: 7 is typed in",
         ),
     ],
 )
