@@ -2376,7 +2376,7 @@ CHAPTER = Chapter(
                 (
                     ray_in_a_fine_map,
                     Reach(0.05, "m", absolute=True),
-                    "Right on other maps, but not on one with cells of 2 cm and a wall of one cell (is the length of a step typed in? "
+                    "Right on maps with cells of 10 cm, but not on one with cells of 2 cm and a wall of one cell (is the length of a step typed in? "
                     "grid.resolution is the width of a cell):",
                 ),
             ],
