@@ -657,6 +657,15 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
     ("it is to be divided by the length of {}, as `len` gives it", lambda v, a: v / len(a)),
     ("it is to be multiplied by the length of {}, as `len` gives it", lambda v, a: v * len(a)),
 )
+OF_SEVERAL = {  # what may be said of values with commas alone around them: what is typed there is done to one of them
+    words: words.replace("it is to be ", "each of them is to be ")
+    for words, _ in OTHERWISE
+    if words.startswith(("it is to be multiplied by", "it is to be divided by", "its entr"))
+} | {
+    "{} is missing: it is to be added": "{} is missing: it is to be added to each of them",
+    "{} is to be taken off": "{} is to be taken off each of them",
+    "it has the wrong sign": "each of them has the wrong sign",
+}
 ALWAYS_THE_SAME = [k for k, (words, _) in enumerate(OTHERWISE) if words in (NOUGHT, ONE)]  # what settles a condition
 IN_ITS_PLACE = next(k for k, (words, _) in enumerate(OTHERWISE) if words == ANOTHER)
 WITH_OWN = 6  # of those that take an argument also take a variable

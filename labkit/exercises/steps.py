@@ -7,6 +7,7 @@ is where it goes wrong.
 
 import ast
 import functools
+import itertools
 import math
 import re
 from dataclasses import dataclass
@@ -405,7 +406,8 @@ class Search:
             there = "on the right side" if self._binds(k) else "in its place"
             return f"{self._where(k)}: with {nought} {there}, your result is right. {NOT_NEEDED}"
         name = "" if other is None else self._bound(other) if kind == "own" else self._given_name(k, other)
-        words = rerun.OTHERWISE[change][0].format(name)
+        words = rerun.OTHERWISE[change][0]
+        words = (rerun.OF_SEVERAL.get(words, words) if self._is_bare_listing(k) else words).format(name)
         words = rerun.OF_TRUTHS.get(words, words) if k in self.written.of_truth else words
         words = rerun.OF_ARRAYS.get(words, words) if self._is_array(k) else words
         words = words.replace("belongs in its place", "belongs on the right side") if self._binds(k) else words
@@ -465,15 +467,15 @@ class Search:
         first = self.values[0]
         reached = (k for k in self._entries_first(among) if first[k][0] and not self._is_filled(k))
         reached = (k for k in reached if not self._is_start(k))
-        seen = [(k, first[k][1][0], self._is_bounded(k)) for k in reached]
+        seen = [(k, first[k][1][0], self._is_bounded(k), self._is_bare_listing(k)) for k in reached]
         for change, (words, function) in enumerate(rerun.OTHERWISE):
             if not self._may_be_said(words) or change < rerun.ALONE and self._is_asked_for(function):
                 continue
             for argument in [None] if change < rerun.ALONE else numeric:
                 others = [] if argument is None else [np.asarray(self.cases[0].args[argument], dtype=float)]
-                for k, value, bounded in seen:
+                for k, value, bounded, bare in seen:
                     counted = SCALED.match(words) and COUNT.search(self.written.places[k][1])
-                    if counted or bounded and words != rerun.SIGNLESS:
+                    if counted or bounded and words != rerun.SIGNLESS or bare and words not in rerun.OF_SEVERAL:
                         continue
                     if SUMMED.search(words) and _is_fixed(self.written.places[k][1].rpartition(" = ")[2]):
                         continue  # nobody sums up what is typed in, or turns it around
@@ -481,6 +483,12 @@ class Search:
                         continue
                     if _changes(function, value, others) and not self._is_all_of_it(k, function, value, others):
                         yield "value", k, change, argument
+
+    def _is_bare_listing(self, k):
+        """Whether several values stand there between commas alone: what is typed behind is done to the last one."""
+        _, code, name, *_ = self.written.places[k]
+        opened = itertools.accumulate((c in "([{") - (c in ")]}") for c in code)  # it may be quoted in part
+        return not name and any(c == "," and not depth for c, depth in zip(code, opened))
 
     def _entries_first(self, among):
         """These places in their order, but what is taken apart at once, as `x` in `x[2]`, behind all others."""
@@ -512,10 +520,13 @@ class Search:
         """Plans of values at these places put together with a variable that was bound before."""
         places, values = self.written.places, self.values[0]
         bound = [k for k, (_, code, name, *_) in enumerate(places) if name and code != name and values[k][0]]
+        bare = {k for k in among if self._is_bare_listing(k)}
         for change in range(rerun.ALONE, rerun.ALONE + rerun.WITH_OWN):
             for variable in bound:
                 for k in sorted(k for k in among if k > variable):
                     if not values[k][0] or self._is_bounded(k):
+                        continue
+                    if k in bare and rerun.OTHERWISE[change][0] not in rerun.OF_SEVERAL:
                         continue
                     if _changes(rerun.OTHERWISE[change][1], values[k][1][0], [values[variable][1][-1]]):
                         yield "own", k, change, variable

@@ -22,7 +22,7 @@ from labkit.exercises.value import Value
 from labkit.files.text import number_in
 from labkit.geometry import chaining, frames
 from labkit.geometry.frames import relative
-from labkit.geometry.lie import exp_se3, log_se3
+from labkit.geometry.lie import exp_se3, exp_so3, log_se3
 from tests.chapters.draws_of_a_check import SEEDS
 
 CHAPTERS = (exercises.CHAPTER, ch03_exercises.CHAPTER)
@@ -299,6 +299,24 @@ def no_length(T):
     return R.magnitude(), np.linalg.norm(T[:0, 3])
 
 
+def backward(transforms):
+    return functools.reduce(np.matmul, transforms[::-1])
+
+
+def by_a_root(T):
+    with np.errstate(invalid="ignore"):
+        half_sine = np.sqrt(3 - np.trace(T[:3, :3])) / 2
+    return 2 * np.arctan2(half_sine, np.sqrt(1 - half_sine**2)), np.linalg.norm(T[:3, 3])
+
+
+def way_back_in_parts(transforms):
+    poses, n = chaining.stations(transforms), len(transforms)
+    turn, shift = log_se3(poses[-1])[:3], poses[-1][:3, 3]
+    ways = (frames.pose(exp_so3(k / n * turn), k / n * shift) for k in range(n + 1))
+    moved = [frames.invert(way) @ P for way, P in zip(ways, poses)]
+    return np.array([frames.relative(A, B) for A, B in zip(moved, moved[1:])])
+
+
 @pytest.mark.parametrize(
     "name, answer, told, untrue",
     [
@@ -307,6 +325,20 @@ def no_length(T):
         ("gram_schmidt", signs_alone, "a reflection", "those of the solution"),
         ("closure_error", no_length, "Your distance is 0 for every T", "You took"),
         ("chain", lambda transforms: np.zeros((4, 4)), "Every entry is 0", "You started"),
+        (
+            "chain",
+            lambda Ts: functools.reduce(np.matmul, Ts[::-1]),
+            "the product in the reverse order",
+            "You multiplied",
+        ),
+        (
+            "chain",
+            lambda Ts: np.linalg.inv(functools.reduce(np.matmul, Ts[::-1])),
+            "of the inverted links",
+            "You inverted",
+        ),
+        ("closure_error", by_a_root, "a root of what is below 0", "arccos gives"),
+        ("distribute_closure", way_back_in_parts, "turn and shift each for itself", "it is off by"),
     ],
 )
 def test_what_is_said_is_true_of_whatever_gives_the_result(name, answer, told, untrue):
@@ -321,6 +353,8 @@ def test_what_stands_in_an_array_is_told_where_it_is_no_number():
 def test_a_heading_is_told_that_it_needs_a_mark():
     told = judged("write_system", lambda points: "x y z\n" + beyond.write_system(points)).text
     assert "A heading needs a # before it" in told
+    told = judged("write_system", lambda points: "\n".join(" ".join(map(repr, point)) for point in points)).text
+    assert "make it Python's first" in told
     assert "heading" not in judged("write_system", lambda points: beyond.write_system(points[:2])).text
 
 
@@ -387,6 +421,19 @@ def pole_from_87_deg(T):
     return np.array([*T[:3, 3], A, -np.arcsin(R[2, 0]), C])
 
 
+def about_z_by_an_angle(T):
+    R = Rotation.from_euler("z", -np.arctan2(T[1, 0], T[0, 0])).as_matrix()
+    return frames.pose(R, -R @ T[:3, 3])
+
+
+def pole_by_r01_and_r02(T):
+    R, cosine = T[:3, :3], np.hypot(T[0, 0], T[1, 0])
+    A, C = np.arctan2(R[1, 0], R[0, 0]), np.arctan2(R[2, 1], R[2, 2])
+    if cosine < 1e-9:
+        A, C = 0.0, np.arctan2(R[0, 1], R[0, 2])
+    return np.array([*T[:3, 3], A, np.arctan2(-R[2, 0], cosine), C])
+
+
 def one_sign_of_qr(a, b):
     Q, _ = np.linalg.qr(np.column_stack([a, b, np.cross(a, b)]))
     if Q[:, 0] @ a < 0:
@@ -419,11 +466,13 @@ def last_turn_only(xyzabc):
     [
         ("gram_schmidt", upward, ""),
         ("invert", from_two_entries, "turned about z alone"),
+        ("invert", about_z_by_an_angle, "turned about z alone"),
         ("matrix_from_kuka", last_turn_only, "All three turns take C"),
         ("matrix_from_kuka", cosine_by_a_root, "cosine of B is never negative"),
         ("fit_frame", four_points_at_least, ""),
         ("kuka_from_matrix", pole_by_r00, ""),
         ("kuka_from_matrix", with_C_at_0_at_the_pole, "At B = -90 deg your A + C has the wrong sign"),
+        ("kuka_from_matrix", pole_by_r01_and_r02, "At B = -90 deg your A + C is half a turn off"),
         ("kuka_from_matrix", pole_from_87_deg, "but not a degree or two beside one"),
         ("gram_schmidt", one_sign_of_qr, "your y and z point the other way where the result is wrong"),
         ("fit_frame", through_other_three_points, "Another pose brings the points nearer"),

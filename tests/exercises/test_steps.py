@@ -739,6 +739,19 @@ def test_no_line_that_fills_a_part_is_blamed_for_the_whole():
     assert "in line 5" not in judged(asked(right, two_numbers), body)
 
 
+def test_what_is_to_be_done_to_values_with_commas_alone_around_them_is_to_be_done_to_each():
+    """It would be typed behind the last of them."""
+
+    def right(a, b, c):
+        return (a * c - np.exp(b * c)) / c
+
+    def draw(rng):
+        return tuple(rng.uniform(1, 2, 3))
+
+    text = judged(asked(right, draw), "p, q = a, b\nreturn (p - np.exp(q)) / c", "a, b, c")
+    assert "in line 2, `a, b`: each of them is to be multiplied by `c`." in text
+
+
 def solved_by(monkeypatch, text):
     """The function of this text, which is the solution of each exercise from here on."""
     known = {"np": np}

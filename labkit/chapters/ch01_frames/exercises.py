@@ -305,6 +305,12 @@ def _about_z_alone(T):
     return _with(T, R, -R @ T[:3, 3])
 
 
+def _about_z_by_its_angle(T):
+    """The same by the angle that these two entries make, as if they were its cosine and sine."""
+    R = _turn("z", -np.arctan2(T[1, 0], T[0, 0]))
+    return _with(T, R, -R @ T[:3, 3])
+
+
 def _two_exchanged(R, i, j):
     """A matrix with two entries in each other's place."""
     R = R.copy()
@@ -427,6 +433,18 @@ def _as_at_one_pole(sign):
         xyzabc = frames.kuka_from_matrix(T)
         if np.hypot(T[0, 0], T[1, 0]) < 1e-9:
             xyzabc[3], xyzabc[5] = 0, np.arctan2(sign * T[0, 1], T[1, 1])
+        return xyzabc
+
+    return variant
+
+
+def _half_a_turn_off_at_the_other_pole(sign):
+    """At both poles A is set to 0 and C read from r01 and r02 as it is right at one of them."""
+
+    def variant(T):
+        xyzabc = frames.kuka_from_matrix(T)
+        if np.hypot(T[0, 0], T[1, 0]) < 1e-9:
+            xyzabc[3], xyzabc[5] = 0, np.arctan2(sign * T[0, 1], sign * T[0, 2])
         return xyzabc
 
     return variant
@@ -588,15 +606,19 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     lambda v: v / ((v @ v) / 2),
-                    "No root of the sum of squares is taken, and a factor 2 is in its place. If you wrote `**1/2`, Python reads it as (...**1)/2: write `**0.5` or np.sqrt.",
+                    "You divide by half the sum of squares, not by its root. If you wrote `**1/2`, Python takes the power 1 and halves afterward: write `**0.5` or np.sqrt.",
                     id="normalize-41c4ee",
                 ),
                 Mistake(
                     lambda v: v / (v @ v) / 2,
-                    "No root of the sum of squares is taken, and a factor 2 is in its place. If you wrote `**1/2`, Python reads it as (...**1)/2: write `**0.5` or np.sqrt.",
+                    "You divide by twice the sum of squares, not by its root. If you wrote `**1/2`, Python takes the power 1 and halves afterward: write `**0.5` or np.sqrt.",
                     id="normalize-half-inline",
                 ),
-                Mistake(lambda v: v / (v @ v), "You divide by the squared length. The root is missing."),
+                Mistake(
+                    lambda v: v / (v @ v),
+                    "You divide by the squared length. The length is its root.",
+                    id="normalize-28cec7",
+                ),
                 Mistake(
                     lambda v: v / v.sum(),
                     "You divide by the sum of the components. The length is the root of the sum of their squares.",
@@ -629,7 +651,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda v: v / np.hypot(v[0], v[1]),
-                    "Only two components are in your length. np.hypot takes two; np.linalg.norm takes all.",
+                    "Only x and y are in your length, as np.hypot(v[0], v[1]) takes them; np.linalg.norm(v) takes all three.",
+                    id="normalize-bb078a",
                 ),
                 Mistake(lambda v: v, "You return v as it came. Its length is not 1 yet."),
                 Mistake(
@@ -684,7 +707,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _projected_without_square,
-                    "The part along a is (b . a)/(a . a) a. You divide by the length of a once, it takes the square (or a normalized a).",
+                    "You removed (b . a)/|a| a. The part of b along a is (b . a)/(a . a) a, or (b . x) x: x in both places.",
+                    id="gram_schmidt-59572b",
                 ),
                 Mistake(
                     _split_alike,
@@ -866,7 +890,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda T: _with(T, t=-T[:3, 3]),
-                    "You negated the translation, but the rotation has to be undone as well: use Rᵀ.",
+                    "You negated the translation, but the rotation has to be undone as well: use Rᵀ, for the translation too, -Rᵀ t.",
+                    id="invert-531209",
                 ),
                 Mistake(
                     lambda T: _with(T, R=T[:3, :3].T, t=np.zeros(3)),
@@ -878,10 +903,16 @@ CHAPTER = Chapter(
                     "The translation stands in the last row. It belongs in the last column, `X[:3, 3]`.",
                     id="invert-last-row",
                 ),
-                Mistake(
-                    _about_z_alone,
-                    "Of the rotation you use two entries, as if it turned about z alone. T turns about any axis: take the whole block, Rᵀ.",
-                    id="invert-about-z",
+                *(
+                    Mistake(
+                        about_z,
+                        "Of the rotation you use two entries, as if it turned about z alone. T turns about any axis: take the whole block, Rᵀ.",
+                        id=id,
+                    )
+                    for about_z, id in (
+                        (_about_z_alone, "invert-about-z"),
+                        (_about_z_by_its_angle, "invert-about-z-by-angle"),
+                    )
                 ),
                 *(
                     Mistake(
@@ -922,7 +953,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, B: A @ frames.invert(B),
-                    "The order is reversed: T_WA T_BW puts an A beside a B, where nothing cancels. It is T_AW T_WB.",
+                    "This is T_WA T_BW, which puts an A beside a B: nothing cancels. It is T_AW T_WB.",
+                    id="relative-54b9b4",
                 ),
                 Mistake(
                     lambda A, B: B @ frames.invert(A),
@@ -1010,7 +1042,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.deg2rad(frames.rotation_angle(_K0_T_K1())),
-                    "The arccosine gives radians already, and here they are converted to radians once more: np.rad2deg makes degrees.",
+                    "This is the angle in radians, converted to radians once more: np.rad2deg makes degrees.",
                     id="angle-deg2rad",
                 ),
                 Mistake(
@@ -1020,7 +1052,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.rad2deg(np.arctan(_K0_T_K1()[1, 0])),
-                    "Below the first entry stands the sine of the angle, and this is its arctangent. np.arctan2 takes sine and cosine.",
+                    "This is 45 deg, or nearly, as is the arctangent of the sine that stands below the first entry of the matrix. np.arctan2 takes sine and cosine.",
                     id="angle-arctangent-of-sine",
                 ),
                 Mistake(
@@ -1137,6 +1169,11 @@ CHAPTER = Chapter(
                     id="distance-chord-of-turn",
                 ),
                 Mistake(
+                    lambda: 0.01,
+                    "0.01 is by how much the points were moved, and nearly the angle that is missing at 90 deg, in rad. How much is it 200 mm away?",
+                    id="distance-moved",
+                ),
+                Mistake(
                     _missing,
                     "This is the angle that is missing at 90 deg, in rad. How much is it 200 mm away?",
                     id="distance-angle",
@@ -1221,13 +1258,18 @@ CHAPTER = Chapter(
                 Mistake(_kuka("zyz"), "You turned about z, y, z. KUKA's third turn is about x: Rz(A) Ry(B) Rx(C)."),
                 Mistake(
                     lambda p: frames.matrix_from_kuka(p * np.array([1, 1, 1, -1, 1, 1])),
-                    "Your Rz turns the wrong way: in Rz, - sin A stands top right and + sin A below it.",
+                    "Your Rz turns the wrong way: in Rz, - sin A stands above the diagonal and + sin A below.",
+                    id="matrix_from_kuka-a1c0ae",
                 ),
                 Mistake(
                     lambda p: frames.matrix_from_kuka(p * np.array([1, 1, 1, 1, 1, -1])),
                     "Your Rx turns the wrong way: in Rx, - sin C stands above the diagonal and + sin C below.",
                 ),
-                Mistake(_kuka_in_degrees, "The angles already are radians: you converted them once too often."),
+                Mistake(
+                    _kuka_in_degrees,
+                    "The angles already are radians: here they are taken for degrees, by a conversion too many or by SciPy's `degrees=True`.",
+                    id="matrix_from_kuka-df5e01",
+                ),
                 Mistake(
                     _kuka_transposed,
                     "Your rotation is the transpose of the right one, as if every turn went the other way, in reverse order.",
@@ -1253,8 +1295,8 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         _turned_back(*wrong),
-                        f"Your {words} turn the wrong way: the minus before the sine stands top right in Rz, "
-                        "bottom left in Ry, and above the diagonal in Rx.",
+                        f"Your {words} turn the wrong way: the minus before the sine stands above the diagonal in Rz "
+                        "and Rx, and bottom left in Ry.",
                         id=f"kuka-turned-back-{''.join(wrong)}",
                     )
                     for wrong, words in (
@@ -1357,6 +1399,15 @@ CHAPTER = Chapter(
                         f"At B = {-90 * sign} deg your A {'+' if sign > 0 else '-'} C has the wrong sign: r01 is sin(C - A) at B = 90 deg and "
                         "-sin(A + C) at -90 deg.",
                         id=f"kuka-as-at-{90 * sign:g}",
+                    )
+                    for sign in (1, -1)
+                ),
+                *(
+                    Mistake(
+                        _half_a_turn_off_at_the_other_pole(sign),
+                        f"At B = {-90 * sign} deg your A {'+' if sign > 0 else '-'} C is half a turn off: r01 and r02 are sin(C - A) "
+                        "and cos(C - A) at B = 90 deg, -sin(A + C) and -cos(A + C) at -90 deg.",
+                        id=f"kuka-half-turn-at-{-90 * sign:g}",
                     )
                     for sign in (1, -1)
                 ),
@@ -1519,6 +1570,10 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _kabsch(handed=lambda U, V: V @ np.diag([np.linalg.det(V @ U.T), 1, 1]) @ U.T),
+                    "The sign belongs to the last column, that of the smallest singular value: there it costs least.",
+                ),
+                Mistake(
+                    _kabsch(handed=lambda U, V: V @ np.diag([1, np.linalg.det(V @ U.T), 1]) @ U.T),
                     "The sign belongs to the last column, that of the smallest singular value: there it costs least.",
                 ),
                 Mistake(

@@ -133,7 +133,10 @@ class Points(metrics.Numbers):
             return super().admit(result, expected)
         except metrics.Refused:
             if isinstance(result, np.ndarray | list | tuple) and _holds_nan(result):
-                words = "NaN stands among your points. `number_in` gives it for what is no number: give 1,5 its point first, and leave comments out"
+                words = (
+                    "NaN stands among your points, as `number_in` and `np.genfromtxt` give it for what is no number: does "
+                    "1,5 get its point first, and are comments left out"
+                )
                 raise metrics.Refused(words) from None
             raise
 
@@ -160,8 +163,7 @@ class reads_back(metrics.Metric):
         try:
             return read_system(result).view(ReadBack)
         except ValueError as fault:
-            bare = ". A heading needs a # before it" if _begins_with_words(result) else ""
-            raise metrics.Refused(f"what you wrote cannot be read: {fault}{bare}") from None
+            raise metrics.Refused(f"what you wrote cannot be read: {fault}{_why_unread(result)}") from None
 
     def deviations(self, result, expected):
         off = float(np.abs(result - self.admit(expected, expected)).max())
@@ -169,6 +171,13 @@ class reads_back(metrics.Metric):
 
     def parts(self, result, expected):
         return [("", metrics.Numbers(0.0, "mm"), result, self.admit(expected, expected))]
+
+
+def _why_unread(text):
+    """What of a text is no number that can be read, as a further sentence, where it is known."""
+    if "np.float" in text:
+        return ". This is how `repr` and `!r` write a number of NumPy: make it Python's first, by `float` or `tolist`"
+    return ". A heading needs a # before it" if _begins_with_words(text) else ""
 
 
 def _begins_with_words(text):
@@ -322,7 +331,7 @@ FILES = [
             ),
             Mistake(
                 lambda text: read_system(text)[[0, 2, 1]],
-                "The last two points have changed places: the point on the x axis is the second line.",
+                "The last two points have changed places: the second point of the file is the one on the x axis.",
                 id="read-order",
             ),
             Mistake(
@@ -383,7 +392,7 @@ FILES = [
             *(
                 Mistake(
                     _written(form),
-                    f"`{form}` keeps {digits} significant digits: what is read back is another number. It takes 17, as `.16e` has them, or `repr`.",
+                    f"{digits} significant digits are kept here, as by `{form}`: what is read back is another number. It takes 17, as `.16e` has them, or `repr`.",
                     id=f"write-{digits}-with-exponent",
                 )
                 for form, digits in (("e", 7), (".10e", 11), (".12e", 13))

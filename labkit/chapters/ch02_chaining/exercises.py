@@ -364,6 +364,14 @@ def _gap_shared_apart(transforms):
     return _moved(poses, moves)
 
 
+def _way_shared_apart(transforms):
+    """The way to the end, its turn and its straight line in N parts each, taken back from the poses from the left."""
+    poses, xi, n = _parts(transforms)
+    ways = exp_se3(np.arange(n + 1)[:, None] / n * xi * np.repeat([1, 0], 3))
+    ways[:, :3, 3] = np.arange(n + 1)[:, None] / n * poses[-1, :3, 3]
+    return _moved(poses, frames.invert(ways))
+
+
 def _translation_from_links(transforms):
     links = transforms.copy()
     links[:, :3, 3] -= chaining.chain(transforms)[:3, 3] / len(links)
@@ -487,11 +495,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda Ts: chaining.chain(Ts[::-1]),
-                    "You multiplied in the reverse order: each new link belongs to the right of what you have, where its letters meet.",
+                    "This is the product in the reverse order. In a loop over the links as they come, each new one goes to the right of what you have, where its letters meet.",
+                    id="chain-953c02",
                 ),
                 Mistake(
                     _elementwise,
-                    "You multiplied entry by entry: `*` is not `@`.",
+                    "You multiplied entry by entry, as `*` and np.prod do. Matrices multiply with @.",
+                    id="chain-88ac46",
                 ),
                 Mistake(
                     lambda Ts: np.eye(4) * _elementwise(Ts),
@@ -499,7 +509,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda Ts: chaining.chain([frames.invert(T) for T in Ts]),
-                    "You inverted every link. The links come as T_01, T_12, ...: their letters meet as they are.",
+                    "This is the product of the inverted links. They come as T_01, T_12, ...: their letters meet as they are.",
+                    id="chain-0effad",
                 ),
                 Mistake(
                     lambda Ts: chaining.chain(Ts[1:]),
@@ -529,7 +540,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda Ts: frames.invert(chaining.chain(Ts)),
-                    "This is the inverse of the chain: T_DA instead of T_AD.",
+                    "This is the inverse of the chain: T_N0 instead of T_0N.",
+                    id="chain-417ee1",
                 ),
                 Mistake(
                     lambda Ts: chaining.chain(Ts).T,
@@ -638,8 +650,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _arccos(lambda T: (np.trace(T[:3, :3]) - 1) / 2, False),
-                    "Right, but rounding can push (trace - 1) / 2 a hair over 1, as in T @ inv(T), and then arccos gives NaN. Cut it with "
-                    "`np.clip(..., -1, 1)`, or read sine and cosine with arctan2.",
+                    "Right, but rounding can push the trace a hair over 3, as in T @ inv(T). An arccosine of what is more than 1 by that is NaN, and so is a root of what is below 0: cut it with `np.clip`, or read sine and cosine with arctan2.",
                     id="closure-clip",
                 ),
                 Mistake(
@@ -727,7 +738,7 @@ CHAPTER = Chapter(
                         _closure(
                             lambda T, part=part: 2 * np.arcsin(min(np.linalg.norm(T[:3, :3] - np.eye(3)) / part, 1))
                         ),
-                        "|R - I| is 2 sqrt(2) sin(angle / 2), as the squares of all nine entries add up: solve this for the angle.",
+                        "By the squares of all nine entries |R - I| is 2 sqrt(2) sin(angle / 2), as a 2-norm 2 sin(angle / 2): solve this for the angle.",
                         id=f"closure-chord-{name}",
                     )
                     for name, part in (("2", 2), ("sqrt-2", np.sqrt(2)), ("4", 4))
@@ -1186,7 +1197,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _equal_moves,
-                    "You moved all poses by the same share. The pose after k links has collected k shares of the error.",
+                    "All poses behind P_0 are moved by the same share here. The pose after k links has collected k shares of the error.",
+                    id="distribute_closure-e199db",
                 ),
                 Mistake(
                     _forward_instead_of_back,
@@ -1222,6 +1234,10 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _gap_shared_apart,
+                    "You shared out turn and shift each for itself. The loop closes, but half the shift is not half the way: move the poses by exp_se3(-k / N * xi).",
+                ),
+                Mistake(
+                    _way_shared_apart,
                     "You shared out turn and shift each for itself. The loop closes, but half the shift is not half the way: move the poses by exp_se3(-k / N * xi).",
                 ),
                 Mistake(
