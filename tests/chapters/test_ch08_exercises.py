@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy import stats
+from scipy.linalg import solve_discrete_are
 
 from labkit.chapters.ch08_kalman import exercises as ch08
 from labkit.chapters.ch08_kalman import stages
@@ -410,6 +411,11 @@ def the_better_alone(x0, var0, z, stds):
     return x0 + gain * (z[k] - x0), (1 - gain) * var0
 
 
+def riccati_of_control(A, C, cov_v, cov_z):
+    P = solve_discrete_are(A, C.T, cov_v, cov_z)
+    return P @ C.T @ np.linalg.inv(C @ P @ C.T + cov_z)
+
+
 def twenty_rounds(A, C, cov_v, cov_z):
     P = np.eye(len(A))
     for _ in range(20):
@@ -479,6 +485,7 @@ def in_degrees_and_half_of_what_is_large(x0, cov0, z, C, cov_z):
         ),
         ("gate", lambda y, S, limit: bool((y**2 < limit * np.diag(S)).all()), "Each number is judged by itself"),
         ("wrap_angle", lambda a: np.fmod(a + np.pi, 2 * np.pi) - np.pi, "An angle below -pi ends below -pi"),
+        ("steady_state_gain", riccati_of_control, "a filter hands it A.T and C.T"),
         ("steady_state_gain", twenty_rounds, "these are too few rounds: on all draws here 400 will do"),
         ("predict_state", scaled_by_the_control, "`U = np.diag(u)`: the identity belongs on the right side"),
         (

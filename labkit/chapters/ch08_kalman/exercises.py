@@ -4,7 +4,7 @@ import functools
 import itertools
 
 import numpy as np
-from scipy.linalg import solve_continuous_are
+from scipy.linalg import solve_continuous_are, solve_discrete_are
 
 from ...documents.lecture import printed as lecture
 from ...estimation import kalman
@@ -1427,9 +1427,9 @@ CHAPTER = Chapter(
             "steady_state_gain",
             reference=steady_state_gain,
             draw=(
-                steady_vehicle,
                 functools.partial(steady_system, n=3, m=2),
                 functools.partial(steady_system, n=2, m=2),
+                steady_vehicle,
             ),
             metric=metrics.Numbers(1e-3),
             noisy=(
@@ -1526,6 +1526,11 @@ CHAPTER = Chapter(
                 Mistake(
                     _rounds(1000, carry=lambda A, P: A.T @ P @ A),
                     "A stands on the wrong side: A cov A^T, not A^T cov A.",
+                ),
+                Mistake(
+                    lambda A, C, Q, R: _gain(solve_discrete_are(A, C.T, Q, R), C, R),
+                    "A stands where its transpose belongs: solve_discrete_are is written for control, and a filter hands it A.T and C.T.",
+                    id="steady_state_gain-a-of-control",
                 ),
                 Mistake(
                     _rounds(1000, carry=lambda A, P: P),
