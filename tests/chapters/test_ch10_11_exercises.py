@@ -484,6 +484,11 @@ def between_axes(T, apart):
     cosines = np.einsum("ij,ij->i", n[:-apart], n[apart:])
     return np.arccos(cosines)
 """
+BACK_FROM_ROW_TO_ROW = """
+def motions(F, S):
+    inv = np.linalg.inv
+    return inv(F[1:]) @ F[:-1], S[:-1] @ S[1:]
+"""
 
 
 @pytest.mark.parametrize(
@@ -509,6 +514,7 @@ def between_axes(T, apart):
             STATUS.replace("bound", "bound / 2").replace("value, bound / 2,", "value, bound,"),
             "bound / 2",
         ),
+        (own, "motions", BACK_FROM_ROW_TO_ROW, "A: Your A leads back, from row i + 1 to row i. Both"),
         (own, "motions", ALL_WITH_ALL, "as `np.dot` gives them"),
         (
             own,

@@ -580,7 +580,7 @@ CHAPTER = Chapter(
             ),
             mistakes=[
                 Mistake(_without_clip,
-                        "Right, but for parallel or opposite axes a scalar product may come out as 1.0000000000000002, of which arccos is NaN: np.clip it to -1 ... 1."),
+                        "Right, but for parallel or opposite axes a scalar product may come out as 1.0000000000000002. Its arccos is NaN, as is the root of 1 less its square: np.clip it to -1 ... 1.", id="between_axes-c342be"),
                 Mistake(_changed(np.rad2deg), "These are degrees. Inside, angles are radians."),
                 *(Mistake(variant, text) for variant, text in OTHER_AXES),
                 Mistake(_changed(np.cos), "These are the cosines: np.arccos is missing."),
