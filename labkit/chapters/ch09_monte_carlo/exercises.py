@@ -2136,7 +2136,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda x, z, marks, *stds: landmark_weight(x, z[:1], marks[:1], *stds),
-                    "Only the first landmark counts. Is `return` inside the loop? It belongs after it.",
+                    "Only the first landmark counts. Does a `return` or `break` end the loop in its first round?",
+                    "landmark_weight-f21930",
                 ),
                 Mistake(_landmarks(stds=(1, 0)), "The two standard deviations have changed places."),
                 Mistake(_landmarks(stds=(0, 0)), "Bearings have a standard deviation of their own, std_bearing."),
@@ -2271,7 +2272,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda l: l.min() + np.log(np.exp(l - l.min()).sum()),
-                    "With impossible particles (-inf) among them the smallest logarithm, or the mean, is -inf too, and -inf - (-inf) is nothing. Take out the largest.",
+                    "With impossible particles (-inf) among them the smallest logarithm is -inf, as are the mean and the one farthest from 0, and -inf - (-inf) is nothing. Take out the largest.",
+                    "log_sum_exp-4c4b3d",
                 ),
                 Mistake(
                     lambda l: np.abs(l).max() + np.log(np.exp(l - np.abs(l).max()).sum()),
@@ -2509,7 +2511,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda r, e, s: float(_normal_log(r[0] - e[0], s)),
-                    "Only the first beam counts. Is `return` inside the loop? It belongs after it.",
+                    "Only the first beam counts. Does a `return` or `break` end the loop in its first round?",
+                    "beam_weight-6ac1f0",
                 ),
                 Mistake(
                     _errors_added_first, "You added the errors and squared their sum. Square each error, then add up."
