@@ -293,13 +293,15 @@ BOUND = Exercise(
         ),
         Mistake(
             lambda f, p: np.abs(np.subtract(*_moves(f, p))).sum() / 2,
-            "This is half of the way from down to up. What counts is how far f moves from its value, up and down: the "
-            "larger of the two moves.",
+            "This is the mean of the two moves, or half of the way from down to up. What counts is how far f moves "
+            "from its value, up and down: the larger of the two.",
             id="bound-fd3da6",
         ),
         Mistake(
             lambda f, p: np.abs(np.subtract(*_moves(f, p))).sum(),
-            "That is the whole way from down to up. A bound says how far f can be from its value: one side of it.",
+            "These are both moves together, or the whole way from down to up. A bound says how far f can be from its "
+            "value: the larger of the two.",
+            id="bound-545cd3",
         ),
         Mistake(
             lambda f, p: np.minimum(*np.abs(_moves(f, p))).sum(),
@@ -954,7 +956,9 @@ SUSPECTS = Exercise(
         ),
         Mistake(
             _search(places=lambda n: range(n)),
-            "The average was printed too, and can carry the slip: try it as well, as the last position.",
+            "You never name the average. It was printed too, and can carry the slip: try it as well, as the last "
+            "position.",
+            id="suspects-d30a04",
         ),
         *(
             Mistake(
@@ -980,7 +984,8 @@ SUSPECTS = Exercise(
         ),
         Mistake(
             _search(places=lambda n: [n]),
-            "You try the average alone. Each entry can carry the slip as well.",
+            "You never name an entry. Each of them can carry the slip as well as the average.",
+            id="suspects-8ea51f",
         ),
         Mistake(
             _search(agree=_close_agrees),
