@@ -73,12 +73,22 @@ class Value(Item):
         return self._compare(metric, run.result, expected)
 
     def _mistake(self, answer, is_it, near=False):
-        """The first mistake whose value `is_it` finds in the answer, or which the answer is near enough to."""
+        """The mistake whose value `is_it` finds in the answer, or else the one which the answer is near enough to; None
+        where several may be meant that are told in different words, as where an answer is rounded.
+        """
+        found, around = [], []
         for k, mistake in enumerate(self.mistakes):
             wrong = mistake.variant()
-            if is_it(answer, wrong) or near and mistake.within and abs(answer - wrong) <= mistake.within:
-                return Outcome(NOT_YET, mistake.text, k)
-        return None
+            if is_it(answer, wrong):
+                found.append(k)
+                if not near:
+                    break
+            elif near and mistake.within and abs(answer - wrong) <= mistake.within:
+                around.append((abs(answer - wrong), k))
+        found = found or [k for _, k in sorted(around)[:1]]
+        if len({self.mistakes[k].text for k in found}) != 1:
+            return None
+        return Outcome(NOT_YET, self.mistakes[found[0]].text, found[0])
 
     def _converted(self, answer, unit, expected):
         if isinstance(unit, int | float):

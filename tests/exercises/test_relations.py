@@ -155,7 +155,12 @@ AREA = Value(
     unit="mm",
     rtol=0.02,
     hints=("a", "b", "c"),
-    mistakes=[Mistake(lambda: 0.0625, "one alone"), Mistake(lambda: 0.2741, "near the truth")],
+    mistakes=[
+        Mistake(lambda: 0.0625, "one alone"),
+        Mistake(lambda: 0.2741, "near the truth"),
+        Mistake(lambda: 0.51234, "half"),
+        Mistake(lambda: 0.51196, "a bit less"),
+    ],
 )
 
 
@@ -166,6 +171,8 @@ AREA = Value(
         (0.0625, NOT_YET, "one alone"),
         (0.0602, NOT_YET, "too small"),  # near a mistake is not that mistake
         (0.2741, NOT_YET, "near the truth"),  # exactly a mistake is one, also within the tolerance
+        (0.5123, NOT_YET, "half"),
+        (0.512, NOT_YET, "too large"),  # what is rounded to digits that two mistakes share is neither
         (0.9, NOT_YET, "too large"),
         (-0.9, NOT_YET, "the other sign"),
         (-0.2758, NOT_YET, "up to its sign"),
