@@ -131,6 +131,7 @@ def test_the_radius_of_listing_c16_by_heart_is_named():
 def test_the_second_minimum_of_the_radius_is_named():
     assert "pose 4" in ITEMS["radius"].judge(29.93312).text  # what a bounded search from 29.8 to 30.2 returns
     assert "sign under the root" in ITEMS["radius"].judge(30.0075).text
+    assert "pose 4" not in ITEMS["radius"].judge(29.9).text  # a guess, and no minimum to the digits that it has
 
 
 def test_how_far_the_three_printed_radii_are_from_the_fitted_one():

@@ -1537,6 +1537,7 @@ CHAPTER = Chapter(
             reference=lambda: _fitted_radius(),
             unit="mm",
             rtol=2e-4,  # to 0.01 mm
+            digits=4,  # three do not tell the radii in question apart
             about=lambda R: _rms_beside(R),
             hints=(
                 "Every y was computed as sqrt(30^2 - r^2). Another radius moves all centers along y, and some radius fits best.",
@@ -1553,7 +1554,7 @@ CHAPTER = Chapter(
                 Mistake(lambda: np.sqrt(2 * 30.0**2 - _fitted_radius() ** 2),
                         "The sign under the root is reversed: y'^2 = y^2 + R^2 - 30^2, so a larger sphere means a larger y'.", within=0.002),
                 Mistake(lambda: 2 * _fitted_radius(),
-                        "This is a diameter: half of it."),
+                        "This is a diameter: half of it.", within=0.05),
                 Mistake(_radius_with_printed_target, "This radius fits best with the sphere's center held where the thesis has it. Free the center as well.", within=0.002, id="radius-center-held"),
                 Mistake(lambda: _rms_with_radius(_fitted_radius()), "This is the rms that the best radius leaves. Asked for is the radius at which it is the least.", within=0.001, id="radius-least-rms"),
                 Mistake(_std_of_radius, "This is the standard deviation of the radius. Asked for is the radius itself.", id="radius-std"),
