@@ -2464,7 +2464,11 @@ CHAPTER = Chapter(
             metric=metrics.Numbers(1e-6),
             noisy=[
                 (whole_scan(beams_at_a_pose), metrics.Numbers(1e-6), WHOLE_SCAN),
-                (beams_from_a_wrong_pose, metrics.Numbers(1e-6), "Right where the map fits, but not far off:"),
+                (
+                    beams_from_a_wrong_pose,
+                    metrics.Numbers(1e-6),
+                    "right, but not for ranges 45 standard deviations off, which are many meters:",
+                ),
                 (
                     functools.partial(beams_of_a_sensor, sharpness=1.0, count=1),
                     metrics.Numbers(1e-6),
