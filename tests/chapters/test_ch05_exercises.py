@@ -277,7 +277,9 @@ def test_good_poses_of_another_frame_are_told_as_such(of, told):
 def test_rows_whose_other_entry_is_the_misprint_are_told():
     metric, wanted = exercises.named_entries(), {("C14", 3, "x"), ("C17", 2, "z"), ("C14", 4, "y")}
     told = str(metric.deviations({("C14", 3, "y"), ("C14", 2, "x")}, wanted)[0])
-    assert told.startswith("3 of 3 misprints are not named yet: in the rows 2, 3 you name")
+    assert told.startswith("3 of 3 misprints are not named yet; in the rows 2, 3 you name")
+    beside = str(metric.deviations({("C14", 3, "y"), ("C14", 2, "x"), ("C14", 4, "y")}, wanted)[0])
+    assert beside.startswith("2 of 3 misprints are not named yet: in the rows 2, 3 you name")
     told = {len(found): str(metric.deviations(found, wanted)[0]) for found in ({("C14", 3, "x")}, set())}
     assert told[1].startswith("2 of 3 misprints are not named yet, in rows of which you name no entry")
     assert "a robust fit is not" in told[1]

@@ -702,7 +702,10 @@ class named_entries(metrics.Exactly):
         if found:
             which = ", ".join(map(str, sorted(found)))
             words = f"in row {which} you name" if len(found) == 1 else f"in the rows {which} you name"
-            words = f"{missed} of {len(expected)} misprints {'is' if missed == 1 else 'are'} not named yet: {words} an entry, but not the misprinted one"
+            here = (
+                ":" if {pose for _, pose, _ in expected - result} == found else ";"
+            )  # or some in rows that are not named
+            words = f"{missed} of {len(expected)} misprints {'is' if missed == 1 else 'are'} not named yet{here} {words} an entry, but not the misprinted one"
             return [metrics.Deviation("", float(missed), "", 0.5, words=words)]
         if missed and result and not accused:
             words = f"{missed} of {len(expected)} misprints {'is' if missed == 1 else 'are'} not named yet, in rows of which you name no entry; what you name is misprinted"
