@@ -329,7 +329,13 @@ class Explanations(Named):
             told = f"{told[:-1]}, and {side}." if side else told
             return told + self._right_parts() + example
         special = self._special_case()
-        asked = ", perhaps by chance." if self._is_choice() else MORE_ACCURATE if near else ": which case is special?"
+        asked = (
+            ", perhaps by chance."
+            if self._is_choice()
+            else MORE_ACCURATE
+            if near
+            else ": what is different about the others?"
+        )
         named = None if special or near else self._named_elsewhere()
         asked = f". What it gives on the others: {named}" if named else asked
         right = special or f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws{asked}"

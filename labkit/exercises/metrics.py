@@ -114,7 +114,7 @@ def _value(result):
         if result.gi_code.co_name == "<genexpr>":
             raise Refused("it returned a generator, whose numbers are still to be computed: make an array of it")
         raise Refused("it returned a generator: use `return`, not `yield`")
-    if type(result) is tuple and len(result) == 4 and np.ndim(result[0]) and isinstance(result[2], INTEGERS):
+    if type(result) is tuple and len(result) == 4 and _are_of_lstsq(*result):
         raise Refused(
             "`lstsq` returns four things in a tuple: x, sum of squares, rank, singular values. Take the first, [0]"
         )
@@ -127,6 +127,11 @@ def _value(result):
         name = getattr(result, "__name__", "something callable")
         raise Refused(f"it returned {name}, a function: are the parentheses missing?")
     return result
+
+
+def _are_of_lstsq(x, squares, rank, singular):
+    """Whether four results are those of `lstsq`: there are no more singular values than unknowns."""
+    return np.ndim(x) and isinstance(rank, INTEGERS) and np.ndim(singular) == 1 and rank <= len(singular) <= len(x)
 
 
 def _converted(result, wanted):

@@ -76,7 +76,7 @@ class Raised(Explanations):
         if isinstance(error, TypeError) and not run.line and re.search(r"(?<!\(\) )argument", run.said):
             wanted = ", ".join(self._names(args) if args else self.exercise.arguments)
             return self.outcome(NOT_YET, f"your function cannot be called with ({wanted}): {run.said}.")
-        if isinstance(error, NameError) and error.name:
+        if isinstance(error, NameError) and error.name and "free variable" not in run.said:
             where = f"\nin {run.line}" if run.line else ""
             nowhere = "neither where it is read nor in a cell that has been run since the kernel started"
             return self.outcome(RAISED, f"NameError: `{error.name}` is not known: it is defined {nowhere}.{where}")

@@ -59,7 +59,7 @@ def _relation(metric, results, expected, sizes, whole):
     expected = [np.asarray(e, dtype=float) for e in expected]
 
     if _are_rounded(results, expected):
-        return "your result is rounded: hand over all digits"
+        return "your result is the right one, rounded: hand over all digits, and go in no whole steps"
 
     if _are_cut_off(results, expected):
         return "your result is the right one without its decimals: is it put into an array of whole numbers?"

@@ -163,7 +163,8 @@ class Value(Item):
         size = "large" if abs(answer) > abs(expected) else "small"
         if answer * expected < 0:
             return f"not this value{self._in_unit()}, and it should have the other sign: the hints lead on."
-        return f"not this value{self._in_unit()}: yours is too {size}. The hints lead on."
+        yours = "without its sign yours" if expected < 0 else "yours"
+        return f"not this value{self._in_unit()}: {yours} is too {size}. The hints lead on."
 
     def _in_unit(self):
         return f" in {self.unit}" if self.unit else ""

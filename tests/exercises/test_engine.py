@@ -481,6 +481,15 @@ def test_a_word_written_otherwise_is_told_how_it_is_written():
     assert not words.equal(words.admit("notstationary", "not stationary"), "not stationary")
 
 
+@pytest.mark.parametrize(
+    "result, words",
+    [(np.linalg.lstsq(np.eye(3), np.ones(3)), "four things"), ((np.ones(3), 0.1, 7, np.ones(3)), "got a tuple")],
+)
+def test_four_results_are_those_of_lstsq_where_they_can_be(result, words):
+    with pytest.raises(metrics.Refused, match=words):
+        metrics.as_array(result, (3,))
+
+
 @pytest.mark.parametrize("result", [Decimal("0.5"), np.array([Decimal("0.5"), Decimal(1)])])
 def test_a_decimal_is_refused_since_it_mixes_with_no_float(result):
     with pytest.raises(metrics.Refused, match=r"got a Decimal, which does not mix with floats: float\(...\) makes one"):
@@ -978,13 +987,18 @@ def test_an_array_that_stands_for_the_reference_is_not_shown(capsys):
         (1235, CORRECT, ""),
         (1230.0, CORRECT, ""),
         (1200.0, NOT_YET, "at least 3 digits"),
-        (1100.0, NOT_YET, "too small"),
+        (1100.0, NOT_YET, ": yours is too small"),
     ],
 )
 def test_rounded_values_need_three_digits(answer, status, words):
     """1234.5: what a notebook prints is enough, whatever the tolerance."""
     outcome = LENGTH.judge(answer)
     assert outcome.status == status and words in outcome.text
+
+
+def test_a_negative_value_is_called_small_without_its_sign():
+    below = replace(LENGTH, reference=lambda: -1234.5, mistakes=())
+    assert ": without its sign yours is too small" in below.judge(-1100.0).text
 
 
 def test_words_count_without_their_case_and_wrong_ones_are_quoted():
@@ -996,7 +1010,17 @@ def test_words_count_without_their_case_and_wrong_ones_are_quoted():
     assert said.startswith("`'low'` is not the answer here.") and "minimum" not in said
 
 
+def of_a_name_bound_later(v):
+    def taken():
+        return later
+
+    half = taken()
+    later = v
+    return half
+
+
 def test_a_name_from_a_cell_not_yet_run_is_explained():
+    assert "is not known" not in DOUBLE.judge(of_a_name_bound_later).text
     outcome = DOUBLE.judge(lambda v: normalize(v))  # noqa: F821
     assert outcome.status == RAISED
     assert (
