@@ -957,7 +957,8 @@ class Search:
     def _may_be_wrong(self, k, solution):
         """Whether a value is but read there, by the name it was given in another line, and is none that is right."""
         name = self.written.places[k][1]
-        return name.isidentifier() and name not in self.names and not self._is_known(k, solution, False)
+        given = name in self.names and self._is_given(k)  # an argument may have been bound anew
+        return name.isidentifier() and not given and not self._is_known(k, solution, False)
 
     def _of_parts(self, k, solution):
         """Whether the parts of a wrong value are right, so that it is what is done with them; or may be wrong."""

@@ -589,6 +589,12 @@ def test_a_wrong_value_may_be_wrong_for_one_that_goes_into_it():
     assert "in line 3, `turn = " in said and "this value is not right, perhaps for one that goes into it." in said
 
 
+def test_a_wrong_value_may_be_wrong_for_an_argument_that_is_bound_anew():
+    body = "T_WA = np.abs(T_WA)\nT_WB = np.abs(2 * T_WB)\nT = np.linalg.solve(T_WA, T_WB)\nreturn T"
+    said = told_of("relative", body, "T_WA, T_WB")
+    assert "`T = np.linalg.solve(T_WA, T_WB)`: this value is not right, perhaps for one that goes into it." in said
+
+
 def test_a_loop_that_takes_the_rows_of_the_solutions_array_one_by_one_is_compared_with_them():
     item = next(c for c in session.chapters() if c.name == "07-dead-reckoning")["lateration_residual"]
     cell = of_cell(
