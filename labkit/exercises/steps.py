@@ -449,9 +449,12 @@ class Search:
         return f"wherever you read `{name}`: {_closed(words)} {self._alone()}"
 
     def _where(self, k):
-        line, code, name, *_ = self.written.places[k]
-        several = name and re.match(r"[\w*, ]*,[\w*, ]*=[^=]", code)  # w, V = ...: which of them
-        return f"in line {line}, `{name if several else code}`{self._of_several(k)}"
+        return f"in line {self.written.places[k][0]}, `{self._meant(k)}`{self._of_several(k)}"
+
+    def _meant(self, k):
+        """The code of a place; of a step that binds several names, as w, V = ..., the name that is meant."""
+        _, code, name, *_ = self.written.places[k]
+        return name if name and re.match(r"[\w*, ]*,[\w*, ]*=[^=]", code) else code
 
     def _of_several(self, k):
         """In which larger part a value stands, if the line has the same code several times."""
@@ -869,10 +872,11 @@ class Search:
             return told
         if of_notebook < units[len(known)]:
             return told
-        line, code, *_ = self.written.places[units[len(known)]]
+        other = units[len(known)]
+        line = self.written.places[other][0]
         if line in self.written.walked and not solution.repeats:
             return told
-        return f"{told}; `{code}` in line {line} is none of them, by a slip or since you go another way"
+        return f"{told}; `{self._meant(other)}` in line {line} is none of them, by a slip or since you go another way"
 
     def _units(self, solution):
         """Places of the steps as a whole, in their order: variables that are bound, and what is part of no other."""

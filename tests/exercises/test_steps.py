@@ -471,6 +471,12 @@ def test_a_result_that_never_changes_is_told():
     assert "Your result is the same on every draw" in said
 
 
+def test_of_a_step_that_binds_several_names_one_is_meant():
+    search = steps.search(typed("w, s = b[0], b[1]\nreturn w * s"), ["a", "b"], _cases(), None, Budget(1.0))
+    bound = [k for k, (_, code, name, *_) in enumerate(search.written.places) if name and "=" in code]
+    assert [search._meant(k) for k in bound] == ["w", "s"]
+
+
 def test_an_entry_of_a_right_value_is_right():
     body = """
     u, v = a[0] - 1.0, a[1] - 2.0
