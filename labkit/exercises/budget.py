@@ -7,6 +7,7 @@ from . import guard
 LOOKING = 1.2  # seconds of processor time, from the beginning of a check, in which an explanation is looked for
 SPECIAL = 0.8  # more, where an answer is right on some draws only, for what the others have in common
 PART = 0.25  # of a budget that one kind of explanation may take
+SHARE = 0.1  # of this, in which one of many attempts must begin to give results: it may have a loop without an end
 
 
 def seconds():
@@ -31,6 +32,10 @@ class Budget:
     def part(self):
         """The budget of one kind of explanation."""
         return Budget(min(PART * self.limit, self.left()))
+
+    def share(self):
+        """The budget of one of many attempts of a kind."""
+        return Budget(min(SHARE * self.limit, self.left()))
 
 
 def _worked():

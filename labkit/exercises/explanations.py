@@ -90,7 +90,7 @@ class Explanations(Named):
             if not kind.left():
                 return None
             mistake = Mistake(function, words)
-            begun = self._fits_within(kind.part().left(), mistake, draws[:1])
+            begun = self._fits_within(kind.share().left(), mistake, draws[:1])
             if begun and self._fits_within(kind.left(), mistake, draws[1:]) and self._fits_more(function):
                 return words
         return None

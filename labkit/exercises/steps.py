@@ -235,7 +235,7 @@ class Search:
         """(plan, what comes of it) one after the other, by `results(plans, budget)`, for as long as there is time."""
         kind, first = self.budget.part(), 0
         while first < len(plans) and kind.left():
-            found = results(plans[first : first + BATCH], kind.part())
+            found = results(plans[first : first + BATCH], kind.share())
             yield from zip(plans[first:], found)
             first += max(1, len(found))  # one that takes all the time alone may have a loop without an end
 

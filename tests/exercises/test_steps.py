@@ -70,7 +70,7 @@ return len(b) * np.sqrt(row[0])
 
 
 def test_a_change_without_an_end_costs_its_share_and_hides_no_other(monkeypatch):
-    monkeypatch.setattr(budget, "LOOKING", 3.0)
+    monkeypatch.setattr(budget, "LOOKING", 6.0)
     assert "In line 3, `3`: 3 stands where 2 belongs. With this alone changed" in told(SUMMED_IN_A_QUEUE)
 
 

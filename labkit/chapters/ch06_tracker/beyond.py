@@ -26,8 +26,11 @@ from ...machines.tracking import static_error_and_lag
 
 
 def readings_of_a_stop(rng, part):
-    """Quaternions of both signs that scatter by two degrees about one whose given part is 0: its sign is noise."""
-    n, center = int(rng.integers(6, 16)), rng.normal(size=4)
+    """Quaternions of both signs that scatter by two degrees about one whose given part is 0: its sign is noise.
+
+    Where that is the scalar part, it is half a turn about one of the axes, at which angles about axes jump as well.
+    """
+    n, center = int(rng.integers(6, 16)), rng.normal(size=4) if part < 3 else np.eye(4)[rng.integers(3)]
     center[part] = 0.0
     R = matrix_from_quaternion(center / np.linalg.norm(center))
     while True:
