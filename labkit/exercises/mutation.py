@@ -869,6 +869,8 @@ WHOLE = "with an array of floats made one of whole numbers"
 ALIASES = ("with another name where a copy belongs", "with a part where a copy belongs")
 AFRESH = "with a list or array that each round finds as it was"
 COUNTED = "with one index counted from the other end"
+SECOND_LIKE_FIRST = "with the second case treated like the first"
+FIRST_LIKE_SECOND = "with the first case treated like the second"
 DIVISOR = "with a divisor where a quotient belongs"
 IN_DEGREES = "with one value times 180/pi, as from radians to degrees"
 REVERSED = (  # (words of what was changed in a right formula, what is wrong where the change mends)
@@ -889,7 +891,8 @@ REVERSED = (  # (words of what was changed in a right formula, what is wrong whe
     (r"with the root of one part taken", "the root of this belongs there"),
     (IN_DEGREES, "this belongs there in degrees"),
     (r"along another axis in one call", "the axis is another one"),
-    (r"with one case treated like the other", "this case needs no treatment of its own"),
+    (SECOND_LIKE_FIRST, "the first of the two values belongs there in all cases"),
+    (FIRST_LIKE_SECOND, "the second of the two values belongs there in all cases"),
     (r"with ([01]) in the place of one part", r"\1 belongs in the place of this"),
     (r"with one slice taken to the end", "what stands behind this slice is left out, and belongs there"),
     (r"with one slice taken from the start", "what stands before this slice is left out, and belongs there"),
@@ -1053,8 +1056,8 @@ def _call(node, names):
     if name == "arctan" and len(node.args) == 2:  # of which it writes the result into the second
         yield 0, "with `arctan2` where `arctan` belongs", _numpy("arctan2", *node.args)
     if name == "where" and len(node.args) == 3:
-        for case in node.args[1:]:
-            yield 0, "with one case treated like the other", case
+        yield 0, SECOND_LIKE_FIRST, node.args[1]
+        yield 0, FIRST_LIKE_SECOND, node.args[2]
     if name == "arctan2" and len(node.args) == 2:
         quotient = _numpy("arctan", ast.BinOp(node.args[0], ast.Div(), node.args[1]))
         yield 0, "with `arctan` of a quotient where `arctan2` belongs", quotient
@@ -1123,8 +1126,8 @@ def _conditions(node, names):
 
 def _cases(node, names):
     yield 0, "with the two cases of one condition exchanged", ast.IfExp(node.test, node.orelse, node.body)
-    yield 1, "with one case treated like the other", node.body
-    yield 1, "with one case treated like the other", node.orelse
+    yield 1, SECOND_LIKE_FIRST, node.body
+    yield 1, FIRST_LIKE_SECOND, node.orelse
 
 
 def _constant(node, names):

@@ -186,13 +186,23 @@ def _digests(of):
     yield f"the number, from 0, of the largest of {of}", lambda e: float(np.argmax(_vector(e)))
     yield f"the number, from 0, of the smallest of {of}", lambda e: float(np.argmin(_vector(e)))
     for axis, each in ((0, "column"), (-1, "row")):
-        yield f"the sum of each {each} of {of}", lambda e, axis=axis: _table(e).sum(axis)
-        yield f"the mean of each {each} of {of}", lambda e, axis=axis: _table(e).mean(axis)
-        yield f"the length (norm) of each {each} of {of}", lambda e, axis=axis: np.linalg.norm(_table(e), axis=axis)
+        yield f"the sum of each {each} of {of}", lambda e, axis=axis: _several(e, axis).sum(axis)
+        yield f"the mean of each {each} of {of}", lambda e, axis=axis: _several(e, axis).mean(axis)
+        yield (
+            f"the length (norm) of each {each} of {of}",
+            lambda e, axis=axis: np.linalg.norm(_several(e, axis), axis=axis),
+        )
 
 
 def _vector(e):
     if e.ndim != 1:
+        raise ValueError
+    return e
+
+
+def _several(e, axis):
+    """A table of more than one row, or column, along an axis: of one alone the sum is that one."""
+    if _table(e).shape[axis] < 2:
         raise ValueError
     return e
 

@@ -54,7 +54,7 @@ NEARER = {  # what brings a result nearer on every draw, and what is said where 
 }
 COMES_NEARER = "the result comes nearer on every draw, and is not there yet"
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
-NO_CASE = re.compile("(never|always) happen$|no treatment of its own$")
+NO_CASE = re.compile("(never|always) happen$|belongs there in all cases$|^this step is too many$")
 TURNED, OTHER_SIGN = "has the wrong sign", "the sign is the other one"
 UNEQUAL = ("where `==` belongs", "where `!=` belongs")  # what computed numbers are never, or always
 TRUTHS = {"`0` belongs": "`False` belongs", "`1` belongs": "`True` belongs"}
@@ -734,12 +734,16 @@ class Search:
         return any(self._is_filled(j) and self.written.places[j][2] == name for j in range(k, len(self.written.places)))
 
     def _made_in_another_shape(self, solution):
-        """Places of arrays, filled further down, of a shape that no value of the solution has, nor the right result."""
+        """Places of arrays, filled further down, of a shape that the right result does not have, nor, where that of the
+        student's result is right, any value of the solution.
+        """
+        admitted = all(case.refused is None for case in self.cases)
+        among = solution.distinct if admitted else ()
         for k in range(len(self.written.places)):
             if self._is_filled(k) or not self._is_filled_later(k):
                 continue
             mine = [values[k][1].shape[1:] for values in self.values]
-            theirs = [[values[q][1].shape[1:] for values in solution.values] for q in solution.distinct]
+            theirs = [[values[q][1].shape[1:] for values in solution.values] for q in among]
             if mine not in [[np.shape(case.expected) for case in self.cases], *theirs]:
                 yield k
 

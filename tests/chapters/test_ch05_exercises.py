@@ -573,3 +573,27 @@ def drawn(name):
 def test_what_the_docstring_admits_is_drawn_in_every_check(name, answer):
     with np.errstate(all="ignore"):
         assert any(is_missed(answer, *case) for case in drawn(name))
+
+
+def test_of_a_single_row_no_sum_is_told():
+    def squeezed(p2, T_BF, x_S, target):
+        return np.squeeze(ITEMS["kuka_residual"].reference(p2, T_BF, x_S, target))
+
+    told = judged("kuka_residual", squeezed).text
+    assert "got shape (3,)" in told and "sum" not in told
+
+
+def test_where_an_array_has_the_wrong_shape_nothing_behind_it_is_that_of_the_solution():
+    def square(function, x, step):
+        n = len(x)
+        J = np.zeros((n, n))
+        for i in range(n):
+            d = np.zeros(n)
+            d[i] = step
+            df = (function(x + d) - function(x - d)) / (2 * step)
+            m = min(n, len(df))
+            J[:m, i] = df[:m]
+        return J
+
+    told = judged("numeric_jacobian", square).text
+    assert "expected an array of shape" in told and "`df`" not in told

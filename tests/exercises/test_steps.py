@@ -1205,7 +1205,11 @@ def several(rng):
             "`multiply` stands where `outer` belongs",
         ),
         (_summed, "return a @ a / 30 + b[0]", "in line 2, `30`: 30 is typed in where `len(a)` belongs."),
-        (_clipped, "return np.where(a < 0, 0.0, np.where(a > 2, 2.0, a))", "this case needs no treatment of its own."),
+        (
+            _clipped,
+            "return np.where(a < 0, 0.0, np.where(a > 2, 2.0, a))",
+            "the second of the two values belongs there in all cases.",
+        ),
         (
             _clipped,
             "c = np.maximum(a, 0)\nif c.min() >= 0:\n    c = c + 1\nreturn c",

@@ -1458,7 +1458,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _angles_by_quotients,
-                    "A quotient loses the quadrant: use np.arctan2(r10, r00) and np.arctan2(r21, r22).",
+                    "A and C come out as by quotients, which lose the quadrant: np.arctan2 takes numerator and denominator and keeps it.",
+                    id="kuka_from_matrix-c5e676",
                 ),
                 Mistake(
                     _angles(np.rad2deg),

@@ -316,7 +316,7 @@ FILES = [
             ),
             Mistake(
                 lambda text: _plainly(re.sub("#.*", "", text)),
-                "Some write 1,5 for 1.5, and a line may hold several of them: replace every comma before you make numbers of its words.",
+                "Some write 1,5 for 1.5, and a line may hold several of them: put a point in the place of every comma, before you split the line into words.",
                 id="read-comma",
             ),
             Mistake(

@@ -754,8 +754,12 @@ CHAPTER = Chapter(
                 ),
                 Mistake(_fields(time=0), "Number 0 is the device. The time stamp comes second, number 1."),
                 *(
-                    Mistake(_fields(quaternion=k), "The quaternion is shifted by one field: it is numbers 11 to 14.")
-                    for k in (10, 12)
+                    Mistake(
+                        _fields(quaternion=k),
+                        "The quaternion is shifted by one field: it is numbers 11 to 14, counted from 0.",
+                        id=f"decode_packet-fb2af7{number}",
+                    )
+                    for k, number in ((10, ""), (12, "-2"))
                 ),
                 *(
                     Mistake(

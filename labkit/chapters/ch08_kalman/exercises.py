@@ -193,6 +193,13 @@ def landmark_behind(rng, side):
     return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
 
 
+def landmark_seen_at(rng, bearing):
+    """A landmark exactly in this direction, as far as numbers go: there some way to a bearing has its seam."""
+    x, r = np.array([*rng.uniform(-4, 4, 2), rng.uniform(-3, 3)]), rng.uniform(1.5, 6)
+    angle = x[2] + bearing
+    return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
+
+
 def seen_from_whole_numbers(rng):
     """A pose of whole numbers and a landmark."""
     x, landmark = seen_landmark(rng)
@@ -1923,6 +1930,14 @@ CHAPTER = Chapter(
                     "right, but not where the landmark stands nearly behind the robot: a difference of two bearings is to be wrapped:",
                 )
                 for side in (1, -1, 0)
+            ]
+            + [
+                (
+                    functools.partial(landmark_seen_at, bearing=bearing),
+                    metrics.Numbers(1e-5),
+                    "right, but not where the landmark stands exactly ahead or abeam of the robot:",
+                )
+                for bearing in (0, np.pi / 2, -np.pi / 2)
             ]
             + along_the_axes(metrics.Numbers(1e-5))
             + near_and_far(metrics.Numbers(1e-5))

@@ -734,7 +734,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _all_letters_without_a_point,
-                    "Where there is no point, all letters are counted as decimals, as with `find`, which gives -1 there. A whole number has no decimals.",
+                    "Where there is no point, all letters are counted as decimals. A whole number has no decimals (`find` gives -1 there).",
+                    id="half_unit-42466f",
                 ),
                 Mistake(_with_the_sign, "Half a unit is a size, without a sign: that of -0,250 is 0.0005."),
                 Mistake(
