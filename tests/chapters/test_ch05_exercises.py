@@ -583,17 +583,18 @@ def test_of_a_single_row_no_sum_is_told():
     assert "got shape (3,)" in told and "sum" not in told
 
 
-def test_where_an_array_has_the_wrong_shape_nothing_behind_it_is_that_of_the_solution():
-    def square(function, x, step):
-        n = len(x)
-        J = np.zeros((n, n))
-        for i in range(n):
-            d = np.zeros(n)
-            d[i] = step
-            df = (function(x + d) - function(x - d)) / (2 * step)
-            m = min(n, len(df))
-            J[:m, i] = df[:m]
-        return J
+def jacobian_made_square(function, x, step):
+    n = len(x)
+    J = np.zeros((n, n))
+    for i in range(n):
+        d = np.zeros(n)
+        d[i] = step
+        df = (function(x + d) - function(x - d)) / (2 * step)
+        m = min(n, len(df))
+        J[:m, i] = df[:m]
+    return J
 
-    told = judged("numeric_jacobian", square).text
+
+def test_where_an_array_has_the_wrong_shape_nothing_behind_it_is_that_of_the_solution():
+    told = judged("numeric_jacobian", jacobian_made_square).text
     assert "expected an array of shape" in told and "`df`" not in told

@@ -548,15 +548,16 @@ def test_a_gate_that_gives_in_after_five_refusals_is_told():
     assert status == NOT_YET and all("called twice with the same arguments" in text for text in texts), texts
 
 
+def slopes_of_a_wrapped_bearing(x, landmark):
+    def see(p):
+        dx, dy = landmark[0] - p[0], landmark[1] - p[1]
+        b = np.arctan2(dy, dx) - p[2]
+        return np.array([np.hypot(dx, dy), np.arctan2(np.sin(b), np.cos(b))])
+
+    x, h = np.asarray(x, float), 1e-6
+    return np.column_stack([(see(x + h * e) - see(x - h * e)) / (2 * h) for e in np.eye(3)])
+
+
 def test_differences_across_the_seam_are_to_be_wrapped_and_no_other_seam_will_do():
-    def slopes(x, landmark):
-        def see(p):
-            dx, dy = landmark[0] - p[0], landmark[1] - p[1]
-            b = np.arctan2(dy, dx) - p[2]
-            return np.array([np.hypot(dx, dy), np.arctan2(np.sin(b), np.cos(b))])
-
-        x, h = np.asarray(x, float), 1e-6
-        return np.column_stack([(see(x + h * e) - see(x - h * e)) / (2 * h) for e in np.eye(3)])
-
-    status, texts = judged("measurement_jacobian", slopes)
+    status, texts = judged("measurement_jacobian", slopes_of_a_wrapped_bearing)
     assert status == NOT_YET and all("`see(x + h * e) - see(x - h * e)`" in text for text in texts), texts
