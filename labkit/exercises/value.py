@@ -128,8 +128,8 @@ class Value(Item):
         if named:
             return named
         if digits > 1:
-            least = f"at least {self.digits} digits are needed"
-            return Outcome(NOT_YET, f"right as far as it goes: {least}, so hand over the computed value.")
+            least = f"right as far as it goes: at least {self.digits} digits are needed"
+            return Outcome(NOT_YET, f"{least}. If it is rounded, hand over the computed value; else compute it finer.")
         words = relations.difference_words(metric, [(answer, expected)]) or self._made_otherwise(answer)
         words = words or self._changed(metric, answer, expected) or relations.ratio_words(answer, expected)
         words = words or self._follows(answer)

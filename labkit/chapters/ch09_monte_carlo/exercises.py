@@ -358,8 +358,8 @@ def equal_logs(rng, count):
 
 
 def one_possible(rng, others):
-    """The logarithm of a weight, alone or among so many impossible ones."""
-    return (rng.permutation([rng.uniform(-900, -800), *[-np.inf] * others]),)
+    """The logarithm of a weight, alone or amid so many impossible ones: from either end the first two are impossible."""
+    return (np.insert(np.full(others, -np.inf), others // 2, rng.uniform(-900, -800)),)
 
 
 LOG_WEIGHTS = (
