@@ -578,19 +578,21 @@ NOUGHT, ONE = "it does not belong there, but 0 in its place", "it does not belon
 IDENTITY = "the identity belongs in its place"
 WEIGHTS = ONE, IDENTITY  # what is as good as no factor
 ANOTHER = "{} belongs in its place"
+OF_TRUTHS = {  # what the same changes are called where they are made to a truth value, or an array of them
+    OPPOSITE: "its opposite belongs there, `not` or `~`",
+    NOUGHT: "it does not belong there, but False in its place",
+    ONE: "it does not belong there, but True in its place",
+}
 OF_ARRAYS = {  # what the same changes are called where they are made to an array: a number may not take its place
     NOUGHT: "it does not belong there, but zeros of its shape in its place",
     ONE: "it does not belong there, but ones of its shape in its place",
+    OF_TRUTHS[NOUGHT]: "it does not belong there, but False for each of its entries",
+    OF_TRUTHS[ONE]: "it does not belong there, but True for each of its entries",
 }
 CONSTANTS = {  # what an argument is replaced with wherever it is read: (a number, an array)
     NOUGHT: ("0", "zeros"),
     ONE: ("1", "ones"),
     IDENTITY: ("1", "the identity"),
-}
-OF_TRUTHS = {  # what the same changes are called where they are made to a truth value, or an array of them
-    OPPOSITE: "its opposite belongs there, `not` or `~`",
-    NOUGHT: "it does not belong there, but False in its place",
-    ONE: "it does not belong there, but True in its place",
 }
 OTHERWISE = (  # (what it should have been, function of the value [and of an argument]), the likeliest first
     ("it has the wrong sign", np.negative),
