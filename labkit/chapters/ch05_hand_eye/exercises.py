@@ -804,9 +804,9 @@ def _of_another_frame(T_BF, T_FS, target):
 def _looks_up(T_BF, T_FS):
     down = T_BF[:, :3, :3] @ T_FS[:3, 2]
     off = np.rad2deg(np.arccos(np.clip(-down[:, 2], -1, 1)))
-    if off.max() <= 91:
+    if off.max() <= 91:  # a degree more than it says: a pose that was meant to be level may be rounded
         return None
-    up = int((off > 91).sum())
+    up = int((off > 90).sum())
     where = "one pose looks" if up == 1 else f"{up} poses look"
     steepest = f"{off.max():.0f} deg from straight down{', at most' if up > 1 else ''}"
     return f"{where} up at the sphere, {steepest}: the table is in the way (90 is the limit)."
