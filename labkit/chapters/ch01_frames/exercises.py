@@ -426,25 +426,13 @@ def _pole_from(limit_deg):
     return variant
 
 
-def _as_at_one_pole(sign):
-    """At both poles A is set to 0 and C read from r01 as it is right at one of them."""
+def _at_both_poles(c):
+    """At both poles A is set to 0 and C is what this makes of the rotation, as it may be right at one of them."""
 
     def variant(T):
         xyzabc = frames.kuka_from_matrix(T)
         if np.hypot(T[0, 0], T[1, 0]) < 1e-9:
-            xyzabc[3], xyzabc[5] = 0, np.arctan2(sign * T[0, 1], T[1, 1])
-        return xyzabc
-
-    return variant
-
-
-def _half_a_turn_off_at_the_other_pole(sign):
-    """At both poles A is set to 0 and C read from r01 and r02 as it is right at one of them."""
-
-    def variant(T):
-        xyzabc = frames.kuka_from_matrix(T)
-        if np.hypot(T[0, 0], T[1, 0]) < 1e-9:
-            xyzabc[3], xyzabc[5] = 0, np.arctan2(sign * T[0, 1], sign * T[0, 2])
+            xyzabc[3], xyzabc[5] = 0, c(T[:3, :3])
         return xyzabc
 
     return variant
@@ -1395,7 +1383,7 @@ CHAPTER = Chapter(
                 ),
                 *(
                     Mistake(
-                        _as_at_one_pole(sign),
+                        _at_both_poles(lambda R, s=sign: np.arctan2(s * R[0, 1], R[1, 1])),
                         f"At B = {-90 * sign} deg your A {'+' if sign > 0 else '-'} C has the wrong sign: r01 is sin(C - A) at B = 90 deg and "
                         "-sin(A + C) at -90 deg.",
                         id=f"kuka-as-at-{90 * sign:g}",
@@ -1404,7 +1392,7 @@ CHAPTER = Chapter(
                 ),
                 *(
                     Mistake(
-                        _half_a_turn_off_at_the_other_pole(sign),
+                        _at_both_poles(lambda R, s=sign: np.arctan2(s * R[0, 1], s * R[0, 2])),
                         f"At B = {-90 * sign} deg your A {'+' if sign > 0 else '-'} C is half a turn off: r01 and r02 are sin(C - A) "
                         "and cos(C - A) at B = 90 deg, -sin(A + C) and -cos(A + C) at -90 deg.",
                         id=f"kuka-half-turn-at-{-90 * sign:g}",

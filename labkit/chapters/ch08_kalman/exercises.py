@@ -184,20 +184,18 @@ def turned_several_times(rng):
     return x + [0.0, 0.0, 2 * np.pi * rng.integers(2, 4) * rng.choice([-1, 1])], landmark
 
 
-def landmark_behind(rng, side):
-    """A landmark so nearly behind the robot that a hundredth of a radian or of a meter takes it across the seam; with
-    side = 0 exactly behind, as far as numbers go.
-    """
-    x, r = np.array([*rng.uniform(-4, 4, 2), rng.uniform(-3, 3)]), rng.uniform(1.5, 6)
-    angle = x[2] + (side * (np.pi - rng.uniform(5e-4, 1e-3)) if side else np.pi)
-    return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
-
-
 def landmark_seen_at(rng, bearing):
-    """A landmark exactly in this direction, as far as numbers go: there some way to a bearing has its seam."""
+    """A pose and a landmark exactly in this direction, as far as numbers go: some way to a bearing has its seam there."""
     x, r = np.array([*rng.uniform(-4, 4, 2), rng.uniform(-3, 3)]), rng.uniform(1.5, 6)
     angle = x[2] + bearing
     return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
+
+
+def landmark_behind(rng, side):
+    """A landmark so nearly behind the robot that a hundredth of a radian or of a meter takes it across the seam; with
+    side = 0 exactly behind.
+    """
+    return landmark_seen_at(rng, side * (np.pi - rng.uniform(5e-4, 1e-3)) if side else np.pi)
 
 
 def seen_from_whole_numbers(rng):
@@ -209,9 +207,7 @@ def seen_from_whole_numbers(rng):
 
 def landmark_ahead(rng):
     """A landmark hardly to the left or to the right of where the robot looks."""
-    x, r = np.array([*rng.uniform(-4, 4, 2), rng.uniform(-3, 3)]), rng.uniform(1.5, 6)
-    angle = x[2] + rng.uniform(5e-4, 1e-3) * rng.choice([-1, 1])
-    return x, x[:2] + r * np.array([np.cos(angle), np.sin(angle)])
+    return landmark_seen_at(rng, rng.uniform(5e-4, 1e-3) * rng.choice([-1, 1]))
 
 
 def within_half_a_turn(rng):
