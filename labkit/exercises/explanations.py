@@ -37,11 +37,6 @@ class Explanations(Named):
         words = self._special_case() if self._right_somewhere() else None
         return f" {words}" if words else ""
 
-    def _agreement(self, search, solution):
-        """How far what is computed on the way is what the solution computes, as one more sentence."""
-        words = search and not self._right_somewhere() and search.agreement_words(solution)
-        return f" {words}." if words else ""
-
     def _relation(self, whole=False):
         """What the general layer says of the results; nothing where one was refused, or only special ones are wrong."""
         if self.refusal or self.exercise.metric is None or self._right_on_plain():

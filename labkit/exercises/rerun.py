@@ -151,16 +151,6 @@ def _iterated(tree):
             yield statement.lineno
 
 
-def _walked(tree):
-    """Lines of loops that go on in steps of their own, so that their values are those of no other way of going."""
-    for loop in ast.walk(tree):
-        made = isinstance(loop, ast.For) and any(
-            isinstance(n, ast.Attribute) and n.attr in ("arange", "linspace") for n in ast.walk(loop.iter)
-        )
-        if made or isinstance(loop, ast.While):
-            yield from range(loop.lineno, loop.end_lineno + 1)
-
-
 class Written:
     """A function that was read again, with the functions `beside` it, [(function, definition)], that it calls.
 
@@ -169,7 +159,7 @@ class Written:
     of_truth: numbers of the places where a truth value, or an array of them, was met in a trace.
     """
 
-    FACTS = ("lines", "of_notebook", "iterated", "searched", "walked", "repeats")
+    FACTS = ("lines", "of_notebook", "iterated", "searched")
 
     def __init__(self, function, tree, lines=None, beside=()):
         self.function, self.beside, self.lines = function, [helper for helper, _ in beside], lines or {}
@@ -198,16 +188,6 @@ class Written:
     def searched(self):
         """Lines in which stands where a search begins."""
         return {line for tree in self.trees for line in _searched(tree)}
-
-    @functools.cached_property
-    def walked(self):
-        """Lines of loops that go on in steps of their own."""
-        return {line for tree in self.trees for line in _walked(tree)}
-
-    @functools.cached_property
-    def repeats(self):
-        """Whether something is done again and again until it is good enough."""
-        return any(isinstance(node, ast.While) for tree in self.trees for node in ast.walk(tree))
 
     @functools.cached_property
     def _changes(self):

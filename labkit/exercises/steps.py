@@ -21,9 +21,7 @@ WORTH = 3  # how unlikely a change of the code may be that is tried before chang
 CLOSE = 1e-7  # how far, relatively, two values may lie apart that are the same
 BATCH = 120  # changes that are tried at once
 ENTRIES = 8  # of a result that are looked at one by one
-ROWS = 4  # of a value that are looked at one by one
 SPOILT = 2  # times as far off is a part that a change makes worse than it was, though it mends another
-NAMED = 4  # values that are told to be right, at most
 ANGLES = re.compile(r"rad|deg|angle|(?<!re)turn|rot|axis|axes|theta|phi|psi|sin|cos|tan|pose|frame", re.IGNORECASE)
 SCALED = re.compile(  # of a choice, which does not depend on how large all is that is compared
     "half of it|twice as much|a thousand|it belongs there in|its (square|root|reciprocal|log|exp|sine|tangent)"
@@ -728,31 +726,6 @@ class Search:
         _, code, name, *_ = self.written.places[k]
         return bool(name) and code.startswith(f"{name}[")
 
-    def _is_filled_later(self, k):
-        """Whether a part of what is bound there is assigned further down: it is not what the line has made of it."""
-        name = self.written.places[k][2]
-        return any(self._is_filled(j) and self.written.places[j][2] == name for j in range(k, len(self.written.places)))
-
-    def _made_in_another_shape(self, solution):
-        """Places of arrays, filled further down, of a shape that the right result does not have, nor, where that of the
-        student's result is right, any value of the solution.
-        """
-        admitted = all(case.refused is None for case in self.cases)
-        among = solution.distinct if admitted else ()
-        for k in range(len(self.written.places)):
-            if self._is_filled(k) or not self._is_filled_later(k):
-                continue
-            mine = [values[k][1].shape[1:] for values in self.values]
-            theirs = [[values[q][1].shape[1:] for values in solution.values] for q in among]
-            if mine not in [[np.shape(case.expected) for case in self.cases], *theirs]:
-                yield k
-
-    def _is_bound_again(self, k):
-        """Whether a name is bound once more further down, on some draws only or in some rounds only."""
-        name = self.written.places[k][2]
-        later = [j for j in range(k + 1, len(self.written.places)) if name and self.written.places[j][2] == name]
-        return any(values[j][0] < values[k][0] for values in self.values for j in later)
-
     def _is_bounded(self, k):
         """Whether a number bounds a value, so that half of it would do as well: only its sign can be wrong."""
         return any(BOUND.search(code) for _, code, _, _, first in self.written.places[k + 1 :] if first <= k)
@@ -794,7 +767,7 @@ class Search:
         end = "" if words[-1] in ".?" else "."
         return f"{self._where(k)}: {words}{end} With the right value there, all that follows is right"
 
-    # What agrees with the solution
+    # Right or spoilt on the way
 
     @_or_nothing
     def passed_words(self, solution, operands=False):
@@ -844,111 +817,6 @@ class Search:
             line, code, *_ = self.written.places[min(rounds)[1]]
             return f"the first value on the way that is not finite is `{code}` in line {line}"
         return None
-
-    @_or_nothing
-    def agreement_words(self, solution):
-        """How far the values on the way are those of the solution, and the first that is none of them."""
-        if solution is None:
-            return None
-        units = self._units(solution)
-        right = [
-            self._is_known(k, solution, False)
-            or self._is_in_each_round(k, solution)
-            or self._is_row(k, solution)
-            or self._is_part(k, solution)
-            or self._is_part(k, solution, _same_but_for_turns)
-            for k in units
-        ]
-        again = [self._is_bound_again(k) for k in units]
-        if True in again:  # what the name stands for in the end is not what is bound there
-            units, right = units[: again.index(True)], right[: again.index(True)]
-        known = units[: right.index(False)] if False in right else units
-        of_notebook = min(self._of_notebook(), default=len(self.written.places))
-        doubtful = min([of_notebook, *self._made_in_another_shape(solution)])
-        known = [k for k in known if k < doubtful]  # what is the same whatever is given may be wrong, and is no unit
-        if not known:
-            return None
-        names = dict.fromkeys(self._called(k) for k in known if self.written.places[k][2])
-        last = f"{self._called(known[-1])} (line {self.written.places[known[-1]][0]})"
-        told = f"{', '.join(list(names)[-NAMED:])}" if len(names) > 1 else last
-        told = f"As far as {told} your values are those of the solution"
-        if len(known) == len(units) or not self._has_counterpart(units[len(known)], solution):
-            return told
-        if of_notebook < units[len(known)]:
-            return told
-        other = units[len(known)]
-        line = self.written.places[other][0]
-        if line in self.written.walked and not solution.repeats:
-            return told
-        return f"{told}; `{self._meant(other)}` in line {line} is none of them, by a slip or since you go another way"
-
-    def _units(self, solution):
-        """Places of the steps as a whole, in their order: variables that are bound, and what is part of no other."""
-        steps = [k for k in range(len(self.written.places)) if self._is_step(k) and not self._is_taken_out(k, solution)]
-        steps = [k for k in steps if not self._is_entry_bound(k) and not self._is_filled_later(k)]
-        inner = {part for k in steps for part in range(self.written.places[k][4], k)}
-        return [k for k in steps if k not in inner and not self._is_filled(k)]
-
-    def _has_counterpart(self, k, solution):
-        """Whether the solution has a value of this kind, as often, that is none of the student's: the one that this
-        should be. One that has it up to a factor may well be right: the factor can follow.
-        """
-        mine = [values[k] for values in self.values]
-        if any(_are_proportional(mine, [values[q] for values in solution.values]) for q in solution.distinct):
-            return False
-        for q in solution.distinct:
-            theirs = [values[q] for values in solution.values]
-            if _are_whole(mine) != _are_whole(theirs):  # counts and labels, say, where lengths are meant
-                continue
-            lacking = not any(
-                self._is_value(other, [t for _, t in theirs]) for other in range(len(self.written.places))
-            )
-            if lacking and all(map(_are_as_many, mine, theirs)) and all(map(_exchangeable, mine, theirs)):
-                return True
-        return False
-
-    def _is_in_each_round(self, k, solution):
-        """Whether a value that is computed once is that of the solution in each of its rounds."""
-        once = all(values[k][0] == 1 for values in self.values)
-        rounds = ([values[q][1] for values in solution.values] for q in solution.distinct if once)
-        return any(
-            self._is_value(k, [t[:1] for t in theirs]) and not any(np.ptp(t, axis=0).any() for t in theirs)
-            for theirs in rounds
-        )
-
-    def _is_row(self, k, solution):
-        """Whether a value is a row of one of the solution's values that has few: several results taken apart, say."""
-        for q in solution.distinct:
-            theirs = [values[q][1] for values in solution.values]
-            few = min(t.shape[1] if t.ndim > 2 else 0 for t in theirs)
-            if few <= ROWS and any(self._is_value(k, [t[:, row] for t in theirs]) for row in range(few)):
-                return True
-        return False
-
-    def _is_part(self, k, solution, same=None):
-        """Whether a value is one entry or one column of the right results, or of a value that the solution has."""
-        expected = [rerun.numeric(case.expected) for case in self.cases]
-        if not any(e is None for e in expected) and self._is_column(k, [e[None] for e in expected], same):
-            return True
-        return any(self._is_column(k, [values[q][1] for values in solution.values], same) for q in solution.distinct)
-
-    def _is_column(self, k, wholes, same):
-        """Whether a value is, round by round, one entry along the last axis of others."""
-        if any(w.ndim < 2 or w.shape[-1] != wholes[0].shape[-1] for w in wholes):
-            return False
-        entries = range(min(wholes[0].shape[-1], ENTRIES))
-        return any(self._is_value(k, [w[..., j] for w in wholes], same) for j in entries)
-
-    def _is_taken_out(self, k, solution):
-        """Whether this is but a part, the length or the transpose of a value that is right."""
-        _, code, name, _, first = self.written.places[k]
-        if code.startswith("len("):
-            return True
-        return not name and code.endswith(("]", ".T")) and first < k and self._is_known(k - 1, solution)
-
-    def _called(self, k):
-        _, code, name, *_ = self.written.places[k]
-        return f"`{name or code}`"
 
     def _is_step(self, k):
         """Whether a value is computed there: no argument, no name that is read, no constant."""
@@ -1143,7 +1011,7 @@ class Solution:
     """The values on the way of the chapter's solution on the same draws."""
 
     def __init__(self, written, cases, budget):
-        self.places, self.values, self.repeats = written.places, _traces(written, cases, budget), written.repeats
+        self.places, self.values = written.places, _traces(written, cases, budget)
         kept = [q for q in range(len(self.places)) if all(values[q][0] for values in self.values)]
         self.distinct = []
         for q in kept:
@@ -1164,11 +1032,6 @@ def _same(a, b):
     return np.shape(a) == np.shape(b) and bool(np.allclose(a, b, rtol=CLOSE, atol=1e-12, equal_nan=True))
 
 
-def _same_but_for_turns(a, b):
-    """Whether angles are the same, or whole turns apart, as one that is wrapped and one that is not."""
-    return np.shape(a) == np.shape(b) and _same(np.round(np.subtract(a, b) / (2 * np.pi)) * (2 * np.pi) + b, a)
-
-
 def _in_rounds(mine, theirs):
     """(count, values) of the solution, row by row where the student's loop takes one row of it in each round."""
     (count, a), (turns, b) = mine, theirs
@@ -1180,32 +1043,10 @@ def _as_kept(rows, count):
     return rows[:count] if rows.ndim and len(rows) > count == rerun.ROUNDS else rows
 
 
-def _are_as_many(mine, theirs):
-    """Whether a value comes in as many rounds as the solution's, or row by row of it: other rounds are another way. Of
-    more rounds than are kept nobody knows.
-    """
-    return mine[0] == _in_rounds(mine, theirs)[0] < rerun.ROUNDS
-
-
 def _exchangeable(mine, theirs):
     """Whether a value of the solution can take the place of one of the student's, and is another."""
     a, (_, b) = mine[1], _in_rounds(mine, theirs)
     return _fits(mine, theirs) and not _same(a, np.broadcast_to(b, a.shape))
-
-
-def _are_proportional(mine, theirs):
-    """Whether values on the way are those of the solution times one factor, the same on all draws."""
-    if any(a.shape != b.shape for (_, a), (_, b) in zip(mine, theirs)):
-        return False
-    a, b = (np.concatenate([values.ravel() for _, values in side]) for side in (mine, theirs))
-    if not b.any():
-        return False
-    largest = np.abs(b).argmax()
-    return _same(a, a[largest] / b[largest] * b)
-
-
-def _are_whole(values):
-    return all((numbers == np.round(numbers)).all() for _, numbers in values)
 
 
 def _fits(mine, theirs):

@@ -110,7 +110,7 @@ class Trial(Raised, Staying):
             step = step or nearer or search.partly_words() or search.given_words(solution)
         if self.refusal:
             words = shape or (f" {step[0].upper()}{closed(step[1:])}" if step else "")
-            return self._refused(words or self._one_shape() or self._agreement(search, solution), mended)
+            return self._refused(words or self._one_shape(), mended)
         if step:
             return self.outcome(NOT_YET, closed(step) + self._about_globals())
         if self._right_on_plain():
@@ -121,5 +121,5 @@ class Trial(Raised, Staying):
         words = unmoved or self._never_said() or self._relation() or self._picked()
         said, example, call = (closed(words) if words else self._deviation()).partition(NOT_RIGHT)
         said += (self._where_it_is_wrong() if words else self._constant() + self._by_chance()) + self._about()
-        words = said + self._agreement(search, solution) + example + call
+        words = said + example + call
         return self.outcome(NOT_YET, words + self._about_globals())
