@@ -59,7 +59,8 @@ TRUTHS = {"`0` belongs": "`False` belongs", "`1` belongs": "`True` belongs"}
 NOT_NEEDED = "What you make of it there does not belong in the result"
 FILLED = re.compile(r"\w+(\[.*?\] *[-+*/@%|&]*| *[-+*/@%|&]+)=[^=]")  # a[k] = ..., a += ...
 HANDED_ON = re.compile(r"(\w+ = )?[\w.]+(\[[\w:, -]*\])*$")  # an array or a part of it, as it is
-ALONE = "With this alone changed, your result is right"
+RIGHT = "your result is right on every draw tried"
+ALONE = f"With this alone changed, {RIGHT}"
 NOT_WHOLE = ", but not for whole numbers yet"
 
 
@@ -322,7 +323,7 @@ class Search:
             if differ and self.mending([("value", k, rerun.ALWAYS_THE_SAME[1], None)]):
                 one = "True" if _is_condition(self.written.places[k][1]) else "1"
                 one = f"{one} everywhere" if among else one
-                return f"{self._where(k)}: with {one} in its place, your result is right, so it is not needed."
+                return f"{self._where(k)}: with {one} in its place, {RIGHT}, so perhaps it is not needed."
         return None
 
     def _may_be_said(self, mends):
@@ -402,7 +403,7 @@ class Search:
         if rerun.OTHERWISE[change][0] == rerun.NOUGHT and self._is_given(k):
             nought = "zeros" if self._is_array(k) else "0"
             there = "on the right side" if self._binds(k) else "in its place"
-            return f"{self._where(k)}: with {nought} {there}, your result is right. {NOT_NEEDED}"
+            return f"{self._where(k)}: with {nought} {there}, {RIGHT}. {NOT_NEEDED}"
         name = "" if other is None else self._bound(other) if kind == "own" else self._given_name(k, other)
         words = rerun.OTHERWISE[change][0]
         words = (rerun.OF_SEVERAL.get(words, words) if self._is_bare_listing(k) else words).format(name)
@@ -443,7 +444,7 @@ class Search:
         if words in rerun.CONSTANTS:
             constant = rerun.CONSTANTS[words][np.ndim(rerun.numeric(self.cases[0].args[plan[1]])) > 0]
             same = f"the right one is the same whatever `{name}` is"
-            return f"with {constant} in the place of `{name}` wherever you read it, your result is right: {same}."
+            return f"with {constant} in the place of `{name}` wherever you read it, {RIGHT}: {same}."
         return f"wherever you read `{name}`: {_closed(words)} {self._alone()}"
 
     def _where(self, k):

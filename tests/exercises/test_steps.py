@@ -84,7 +84,7 @@ def test_what_is_right_stays_right():
         ("b - (b", "b + (b", "in line 4, `b + (b @ x) * x`: plus stands where minus belongs."),
         ("a / np", "b / np", "in line 2, `b`: `a` belongs in its place."),
         ("range(n)", "range(n - 1)", "in line 6, `n - 1`: one term is too many."),
-        ("r[k] ** 2", "r[k]", ": its square belongs there. With this alone changed, your result is right."),
+        ("r[k] ** 2", "r[k]", f": its square belongs there. {steps.ALONE}."),
         ("total +=", "total =", "in line 7, `total = r[k] ** 2`: `=` throws away what was there before"),
         ("b @ x) * x", "b @ x)", "in line 4, `b @ x`: it is to be multiplied by `x`."),
         ("r[k] ** 2", "r[k] * 2", "n line 7, `r[k] * 2`: `*` stands where `**` belongs."),
@@ -126,7 +126,7 @@ def test_the_line_and_the_slip_are_told(right, wrong, said):
             x[:] = a / np.linalg.norm(a)
             return len(b) * np.linalg.norm(b + (b @ x) * x)
             """,
-            "With this alone changed, your result is right, but not for whole numbers yet.",
+            f"{steps.ALONE}, but not for whole numbers yet.",
         ),
         (
             """
@@ -429,7 +429,7 @@ def test_an_argument_of_which_the_right_result_is_independent_is_told():
     """`u, v = 1` would raise: an array of ones is what mends it."""
     item = replace(ITEM, reference=lambda a, b: b[0])
     said = item.judge(typed("u, v, w = a\nreturn b[0] * (u + a[1] + w) / 3"), rng=np.random.default_rng(0)).text
-    assert said.startswith("with ones in the place of `a` wherever you read it, your result is right:")
+    assert said.startswith(f"with ones in the place of `a` wherever you read it, {steps.RIGHT}:")
 
 
 def test_a_list_that_is_repeated_is_told():
@@ -459,7 +459,7 @@ def test_a_step_is_the_second_entry_less_the_first():
         reference=lambda a, b: (a[1] - a[0]) * b.sum(),
     )
     said = item.judge(typed("h, n = a[1], len(a)\nreturn h * sum(b[:n])"), rng=np.random.default_rng(0)).text
-    assert "in line 2, `a[1]`: `a[0]` is to be subtracted. With this alone changed, your result is right." in said
+    assert f"in line 2, `a[1]`: `a[0]` is to be subtracted. {steps.ALONE}." in said
 
 
 def test_a_result_that_never_changes_is_told():
@@ -967,7 +967,7 @@ def test_a_change_that_makes_weights_alike_is_not_told_as_the_slip(weights):
 def test_a_sign_that_only_leads_to_a_bound_is_told_as_a_weight_that_is_not_needed():
     body = "w = 1 / np.maximum(np.abs(a), 1e-9)\nreturn (w @ b) / w.sum()"
     said = judged(asked(lambda a, b: b.mean(), two_vectors), body)
-    assert "with 1 everywhere in its place, your result is right, so it is not needed" in said
+    assert f"with 1 everywhere in its place, {steps.RIGHT}, so perhaps it is not needed" in said
 
 
 @pytest.mark.parametrize(
@@ -1266,7 +1266,7 @@ def test_what_is_too_coarse_is_told_before_the_solution_is_looked_at(monkeypatch
 def test_an_argument_on_which_nothing_depends_is_told_as_such():
     item = asked(lambda a, b: np.array([a, 2 * a]), both_positive)
     body = "c = b\nreturn np.array([a * np.cosh(c), 2 * a * np.cos(c)])"
-    assert "`c = b`: with 0 on the right side, your result is right. What you make of it there" in judged(item, body)
+    assert f"`c = b`: with 0 on the right side, {steps.RIGHT}. What you make of it there" in judged(item, body)
 
 
 def test_what_stands_within_bounds_has_not_changed_places_with_another():
