@@ -266,9 +266,10 @@ class PlanarPoses(Metric):
     def deviations(self, result, expected):
         expected = np.asarray(expected, dtype=float)
         position = Numbers(self.tol, "m").deviations(result[..., :2], expected[..., :2])[0]
+        distance = np.linalg.norm(result[..., :2].astype(float) - expected[..., :2], axis=-1).max(initial=0.0)
         heading = Angles(self.tol).deviations(result[..., 2], expected[..., 2])[0]
         return [
-            Deviation("the position", position.amount, "m", position.tolerance),
+            Deviation("the position", float(distance), "m", position.tolerance),
             Deviation("the heading", heading.amount, "deg", heading.tolerance),
         ]
 

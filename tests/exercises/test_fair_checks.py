@@ -30,8 +30,8 @@ def test_a_planar_pose_is_the_same_after_a_turn():
     metric, pose = metrics.PlanarPoses(), np.array([1.0, -2.0, 3.1])
     assert metric.equal(pose + [0, 0, -2 * np.pi], pose) and metric.equal(list(pose), pose)
     assert not metric.equal(pose + [0, 0, 0.01], pose) and not metric.equal(pose + [1e-6, 0, 0], pose)
-    position, heading = metric.deviations(pose + [0.3, 0, 2 * np.pi + 0.1], pose)
-    assert str(position) == "the position is off by 0.3 m" and str(heading) == "the heading is off by 5.73 deg"
+    position, heading = metric.deviations(pose + [0.3, 0.4, 2 * np.pi + 0.1], pose)
+    assert str(position) == "the position is off by 0.5 m" and str(heading) == "the heading is off by 5.73 deg"
     assert not metric.equal([1.0, 2.0], pose)
 
 

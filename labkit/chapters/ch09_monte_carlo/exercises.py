@@ -929,6 +929,11 @@ def _field_of_single_cells(grid, pose, ranges, bearings, std):
     return float(_normal_log(grid.distance[*cells.T], std).sum())
 
 
+def _field_of_all_rows_and_columns(grid, pose, ranges, bearings, std):
+    rows, columns = grid.cell_of(_end_points(pose, ranges, bearings))
+    return float(_normal_log(grid.distance[np.ix_(rows, columns)], std).sum())
+
+
 def _field_in_degrees(grid, pose, ranges, bearings, std):
     angle = np.rad2deg(pose[2] + bearings)
     return _field(grid, pose[:2] + ranges[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]), std)
@@ -1378,14 +1383,23 @@ def _is_right_of_many(resample, rng):
     if isinstance(found, str):
         return f"with {len(MANY)} weights: {found}."
     counts, expected = found * len(MANY) * TURNS, MANY / MANY.sum() * len(MANY) * TURNS
-    off = np.abs(counts - expected)
-    if counts.min() >= FEWEST - 0.5 and counts.max() <= MOST + 0.5 and (off**2 / expected).sum() < APART:
-        return None
-    k = int(np.argmax(off))
-    return (
-        f"of {len(MANY)} weights, 0.02 and 0.04 by turns, index {k} came out {counts[k]:.0f} times in {TURNS} calls, where about "
-        f"{expected[k]:.0f} are expected: do your spins reach from 0 to the sum W, and no farther?"
-    )
+    off, weights = np.abs(counts - expected), f"{len(MANY)} weights, 0.02 and 0.04 by turns"
+    chi_square = (off**2 / expected).sum()
+    if not FEWEST <= counts.min().round() <= counts.max().round() <= MOST:
+        k = int(np.argmax(off))
+        return (
+            f"of {weights}, index {k} came out {counts[k]:.0f} times in {TURNS} calls, where about "
+            f"{expected[k]:.0f} are expected: do your spins reach from 0 to the sum W, and no farther?"
+        )
+    if chi_square >= APART:
+        return (
+            f"in {TURNS} calls with {weights}, the counts lie farther from their shares than chance explains: the sum of "
+            f"(count - expected)^2 / expected is {chi_square:.0f}, where about {len(MANY)} is to be expected."
+        )
+    return None
+
+
+EACH_SPIN = "each spin must reach over the whole wheel, and none may depend on another"
 
 
 def _spins_are_independent(resample, rng):
@@ -1393,9 +1407,7 @@ def _spins_are_independent(resample, rng):
     counts = np.array([np.bincount(resample(weights.copy(), rng), minlength=10) for _ in range(600)])
     variance = float(counts.var(0).mean())
     if variance < 0.6:
-        return (
-            f"the spins are not independent: a count varies by {variance:.2f} instead of 0.9 (variance of a binomial)."
-        )
+        return f"a count varies by {variance:.2f} instead of 0.9 (variance of a binomial): {EACH_SPIN}."
     if variance > 1.3:
         return (
             f"some spins go together: a count varies by {variance:.1f} instead of 0.9 (variance of a binomial). Each spin needs "
@@ -1404,8 +1416,8 @@ def _spins_are_independent(resample, rng):
     half = float(counts[:, :5].sum(1).var())
     if half < HALF_VARIES:
         return (
-            f"the spins are not independent: the draws from one half of the wheel vary by {half:.1f} instead of 2.5. "
-            "Does each spin start where the last one ended?"
+            f"the draws from one half of the wheel vary by {half:.1f} instead of 2.5: {EACH_SPIN}. Does each spin start "
+            "where the last one ended?"
         )
     return None
 
@@ -2618,6 +2630,12 @@ CHAPTER = Chapter(
                 Mistake(_field_probability, "This is p itself, which underflows with many beams. Return log p."),
                 Mistake(_field_no_peak, "The factor 1 / (std sqrt(2 pi)) of each beam is missing."),
                 Mistake(_field_origin, "The robot's position is missing: a range starts where the robot stands."),
+                Mistake(
+                    _field_of_all_rows_and_columns,
+                    "This is the sum over the row of every end point with the column of every other as well: a cell is the "
+                    "row and the column of one end point, `grid.distance[rows, columns]`.",
+                    id="field-all-rows-and-columns",
+                ),
                 Mistake(
                     _field_of_single_cells,
                     "You count each cell once. Several beams may end in one cell, and each of them counts.",
