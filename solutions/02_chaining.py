@@ -237,10 +237,11 @@ def orthonormalize(T):
 
 
 # %% many-rounds
+once = chaining.chain(printed)  # nothing repaired on the way
 worn, repaired = np.eye(4), np.eye(4)
 for rounds in range(1, 1001):
-    worn = worn @ product
-    repaired = orthonormalize(repaired @ product)
+    worn = worn @ once
+    repaired = orthonormalize(repaired @ once)
     if rounds in (1, 10, 100, 1000):
         defect = chaining.orthonormality_error(worn)
         kept = chaining.orthonormality_error(repaired) < 1e-12

@@ -1033,6 +1033,7 @@ FORGOTTEN = [
     ("normalize", lambda v: np.linalg.norm(v) < 1e-6),
     ("normalize", lambda v: np.count_nonzero(v) == 2),
     ("gram_schmidt", lambda a, b: frames.arm_angle(a, b) < 0.1),
+    ("gram_schmidt", lambda a, b: frames.arm_angle(a, b) < 0.01),
     ("gram_schmidt", lambda a, b: np.linalg.norm(b) > 20 * np.linalg.norm(a)),
     ("frame_from_points", lambda o, x, y: np.linalg.norm(o) > 1e3),
     ("frame_from_points", lambda o, x, y: o[2] == x[2] == y[2] != 0),
@@ -1044,6 +1045,7 @@ FORGOTTEN = [
     *(("matrix_from_kuka", lambda p, k=k, s=s: s * p[3 + k] > 2 * np.pi) for k in range(3) for s in (1, -1)),
     ("kuka_from_matrix", lambda T: 1e-9 < np.hypot(T[0, 0], T[1, 0]) < 1e-4),
     ("kuka_from_matrix", lambda T: T[0, 0] == 0 and T[0, 2] * T[2, 0] != 0),
+    *(("kuka_from_matrix", lambda T, s=s: 1 - 1e-15 < s * T[2, 0] < 1) for s in (1, -1)),
     ("kuka_from_matrix", lambda T: T[1, 0] < 0 < T[0, 0] and T[2, 2] < 0 < T[2, 1]),
     ("fit_frame", lambda p, q: len(p) > 8),
     ("fit_frame", lambda p, q: not p[:, 2].any()),
@@ -1052,9 +1054,14 @@ FORGOTTEN = [
     ("chain", lambda links: (links == np.eye(4)).all(axis=(1, 2)).any()),
     ("closure_error", lambda T: _turn(T) > 0 and not T[:3, 3].any()),
     ("closure_error", lambda T: 0 < _turn(T) < 1e-5),
+    ("closure_error", lambda T: 0 < _turn(T) < 1e-6 and np.linalg.norm(T[:3, 3]) < 1e-6),
     ("closure_error", lambda T: abs(_turn(T) - np.pi / 2) < 0.1),
     ("orthonormalize", lambda T: np.linalg.det(T[:3, :3]) > 5),
     ("orthonormalize", lambda T: np.allclose(T[:3, :3].T @ T[:3, :3], np.eye(3), atol=1e-12)),
+    (
+        "orthonormalize",
+        lambda T: np.ptp([1, np.linalg.norm(T[:3, 0])]) > 1e-7 and np.allclose(T[:3, :3].T @ T[:3, :3], np.eye(3)),
+    ),
     ("distribute_closure", lambda links: len(links) > 7),
     ("distribute_closure", lambda links: 0 < _turn(chaining.chain(links)) < 1e-3),
     ("distribute_closure", lambda links: _turn(chaining.chain(links)) > np.pi / 2),
@@ -1064,7 +1071,12 @@ FORGOTTEN = [
     ("pivot_residuals", lambda T, tip, point: not tip.any()),
     ("solve_pivot", lambda A, b: len(b) == 9),
     ("pivot_covariance", lambda A, r: len(r) == 3),
+    (
+        "solve_pivot",
+        lambda A, b: (lambda r: np.abs(r).max() > 5 * np.abs(r).mean() > 1e-6)(A @ lstsq(A, b, rcond=None)[0] - b),
+    ),
     ("pivot_covariance", lambda A, r: r.std() > 5),
+    ("pivot_covariance", lambda A, r: np.abs(r).max() > 5 * r.std()),
     ("robust_weights", lambda d, scale: ((d > 6.8 * scale) & (d < 7 * scale)).any()),
     ("robust_weights", lambda d, scale: scale > 10),
     ("robust_weights", lambda d, scale: scale < 0.01),
@@ -1197,6 +1209,36 @@ def test_a_number_that_counts_otherwise_is_explained():
         told = judged("read_system", lambda text, full=full: read([*filter(full, text.splitlines())], 1)).text
         assert "Empty lines and comments are lines of the file too" in told
     assert "is it 0 in your count?" in judged("read_system", lambda text: read(text.splitlines(), 0)).text
+
+
+@pytest.mark.parametrize(
+    "change, told",
+    [
+        (lambda text: text.strip(), "does `strip` take them off"),
+        (lambda text: "\n".join(line for line in text.split("\n") if line[:1] != "#"), "are they left out before"),
+        (lambda text: text.replace("x y z", ""), "holds words alone"),
+        (lambda text: re.sub(r"12.5 3.0 #.*", "#", text), "holds two numbers before a comment"),
+        (lambda text: text.replace("1e999", "1e99"), "holds 1e999"),
+        (lambda text: text.replace(" 5.0 6.0 7.0", "\n5.0 6.0 7.0"), "holds six numbers"),
+    ],
+)
+def test_whatever_is_no_point_is_refused_with_its_line(change, told):
+    """How lines are counted is explained where they are: "expected 3 points, got 2" counts points."""
+    outcome = judged("read_system", lambda text: read_points(change(text).splitlines()))
+    assert outcome.status == NOT_YET and told in outcome.text
+    assert ("lines of the file too" in outcome.text) == told.endswith(("take them off", "left out before"))
+
+
+def test_one_point_is_no_system_and_single_precision_loses_digits():
+    def squeezed(text):
+        points = np.squeeze(read_points(text.splitlines(), count=None))
+        if len(points) != 3:
+            raise ValueError("three points")
+        return points
+
+    assert "a file of 1 point is no system" in judged("read_system", squeezed).text
+    single = judged("read_system", lambda text: read_points(text.splitlines()).astype(np.float32))
+    assert single.status == NOT_YET and "single precision" in single.text
 
 
 def test_digits_of_another_number_name_no_line():

@@ -76,6 +76,7 @@ EDGES = (
             ("a second edge that is much longer, at more than 90 deg to the first", (25.0, 900.0), 120.0),
             ("a second edge that is much shorter", (900.0, 25.0), 60.0),
             ("a flat triangle", (250.0, 200.0), 4.0),
+            ("a very flat triangle", (250.0, 200.0), 0.05),
             ("a flat triangle, the origin in its middle", (250.0, 200.0), 176.0),
         )
     ),

@@ -74,6 +74,7 @@ TYPED = tuple(
         ("with three numbers in a comment", ["# 7.5 8.5 9.5", "1.5 2.0 3.5"]),
         ("with a comment at the end", ["1.5 2.0 3.5", "# the end"]),
         ("with a comma in a comment", ["1.5 2.0 3.5 # first, second"]),
+        ("with the same point twice", [PLAIN[0]]),
         ("with empty lines at the end", ["1.5 2.0 3.5", "", "  ", ""]),
     )
 )
@@ -196,25 +197,29 @@ FAULTS = (
     ("nan", "12.5 nan 3.0"),
     ("inf", "12.5 3.0 -inf"),
     ("a letter behind a number", "12.5 7x 3.0"),
+    ("six numbers", "12.5 3.0 4.0 5.0 6.0 7.0"),
+    ("words alone", "x y z"),
+    ("two numbers before a comment", "12.5 3.0 # by hand"),
+    ("1e999, which no float holds", "12.5 1e999 3.0"),
 )
 
 
 def names_the_line(student, rng):
     """A sentence about the first fault that is not refused with its line, None if all are.
 
-    The points stand far down, below comments and empty lines, at a line whose number is none of those in it. Each fault
+    The points stand far down, below empty lines and comments, at a line whose number is none of those in it. Each fault
     stands in place of each point, then the number of points is wrong, then each fault stands below three good points.
     """
     good = write_system(system(rng).round(3)).splitlines()
-    above = ["# a comment", "", "  "] * int(rng.integers(20, 30))
+    above = [""] * EMPTY_FIRST + ["# a comment", "", "  "] * int(rng.integers(20, 30))
     first = int(rng.integers(3))
     for what, bad in FAULTS:
         for at in np.roll(range(3), -first):
             told = _misread(student, [*above, *good[:at], bad, *good[at + 1 :]], len(above) + at + 1, f"holds {what}")
             if told:
                 return told
-    for count in (2, 4, 6, 0):
-        words = f"a file of {count} points" if count else "an empty text"
+    for count in (1, 2, 4, 6, 0):
+        words = f"a file of {count} point{'s' * (count > 1)}" if count else "an empty text"
         if _refusal(student, [*good, *good][:count], words) is None:
             return f"{words} is no system: {ACCEPTED}"
     told = _misplaced(student, above, good)
@@ -228,6 +233,7 @@ def names_the_line(student, rng):
     return None
 
 
+EMPTY_FIRST = 2  # lines, which `strip` takes off
 LONGEST = 150  # characters of a sentence that are shown
 REFUSED = "that must raise a ValueError"
 ACCEPTED = f"{REFUSED}, yours returned without one."
@@ -254,10 +260,12 @@ def _misread(student, lines, number, what):
         return f"{where}: {ACCEPTED}"
     if _names(refusal, number):
         return None
-    why = ""
-    if _names(refusal, number - 1):
+    why, kept = "", (str.strip, _content, _uncommented)
+    if _counts(refusal, number - 1):
         why = " The first line is line 1: is it 0 in your count?"
-    elif any(_names(refusal, sum(map(bool, map(held, lines[:number])))) for held in (str.strip, _content)):
+    elif _counts(refusal, number - EMPTY_FIRST):
+        why = " Empty lines at the beginning are lines of the file too: does `strip` take them off before lines are counted?"
+    elif any(_counts(refusal, sum(map(bool, map(held, lines[:number])))) for held in kept):
         why = " Empty lines and comments are lines of the file too: are they left out before lines are counted?"
     return f"{where}: your sentence does not name the line. It says: {_quoted(refusal)}.{why}"
 
@@ -270,6 +278,16 @@ def _quoted(sentence):
 def _content(line):
     """What stands before a comment."""
     return line.partition("#")[0].strip()
+
+
+def _uncommented(line):
+    """Whether a line is no comment from its beginning on."""
+    return not line.strip().startswith("#")
+
+
+def _counts(refusal, number):
+    """Whether a sentence says that it is this line; the number of points that it may hold as well is none."""
+    return bool(re.search(rf"\bline\W{{0,3}}{number}\b", refusal, re.IGNORECASE))
 
 
 def _names(refusal, number):
@@ -294,8 +312,8 @@ FILES = [
         "read_system",
         reference=read_system,
         draw=TEXTS,
-        metric=Points(1e-12, "mm"),
-        properties=(names_the_line, right_where(read_system, Points(1e-12, "mm"), *TYPED)),
+        metric=Points(1e-12, "mm", double=True),
+        properties=(names_the_line, right_where(read_system, Points(1e-12, "mm", double=True), *TYPED)),
         hints=(
             "Go through the lines with their numbers; a line that holds nothing but a comment holds no point.",
             "Cut each line at `#`, make commas points, split it at blanks. Three finite numbers are a point; whatever else is left is a fault, and its line is named.",
@@ -348,6 +366,11 @@ FILES = [
                 lambda text: read_system(text).round(3),
                 "You rounded. A reader keeps what the file holds.",
                 id="read-rounded",
+            ),
+            Mistake(
+                lambda text: read_system(text).astype(np.float32),
+                "Your points are in single precision, seven digits. A reader keeps all that the file holds: an array of floats as NumPy makes it.",
+                id="read-single",
             ),
         ],
     ),

@@ -1202,7 +1202,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _forward_instead_of_back,
-                    "You moved by +k/N xi, on in the direction of the error: now the loop is twice as far open.",
+                    "This is what poses moved by +k/N xi give, on in the direction of the error: now the loop is twice as far open. The pose after k links goes back by k/N.",
                 ),
                 Mistake(
                     _divided_by(lambda n: n + 1),

@@ -79,6 +79,7 @@ PRODUCTS = tuple(
         ("is half a turn", dict(angle=HALF)),
         ("turns by a few millionths of a radian", dict(angle=4e-6)),
         ("turns by some thousandths of a degree and hardly shifts", dict(angle=4e-5, reach=4e-5)),
+        ("turns by less than a millionth of a radian and hardly shifts", dict(angle=4e-7, reach=4e-7)),
         ("shifts along x alone", dict(along=(1.0, 0.0, 0.0))),
         ("shifts against x, y and z", dict(along=(-1.0, -2.0, -1.5))),
         *((f"turns about {'xyz'[axis]} alone", dict(angle=2.0, axis=axis)) for axis in range(3)),
@@ -102,6 +103,7 @@ BLOCKS = (
             ("a block three times as long as a rotation", (3, 3, 3)),
             ("a block off by some thousandths", (1.003, 0.998, 1.001)),
             ("a block off by 1e-8", (1 + 1e-8, 1, 1 - 2e-8)),
+            ("a block with right angles, too long by some millionths", (1 + 4e-6, 1 + 4e-6, 1 + 4e-6)),
             ("a block with a small singular value", (1.3, 0.9, 0.08)),
             ("a block with a large singular value", (12, 1.5, 0.9)),
         )

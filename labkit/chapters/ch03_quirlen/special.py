@@ -98,24 +98,26 @@ def of_whole_numbers(rng):
     return frames.pose(R, rng.integers(-90, 90, (5, 3)).astype(float)), *vectors(rng, [60.0, 250.0])
 
 
-def system(rng, **kind):
-    """Stacked matrix and right-hand side."""
+def system(rng, outlier=0.0, **kind):
+    """Stacked matrix and right-hand side, one pose perhaps an outlier."""
     T = poses(rng, **kind)
+    T[0, :3, 3] += outlier
     return pivot.pivot_matrix(T), pivot.pivot_rhs(T)
 
 
 SYSTEMS = tuple(
-    (f"of {words}", functools.partial(system, **kind))
+    (words, functools.partial(system, **kind))
     for words, kind in (
-        ("three poses", dict(count=3)),
-        ("four poses", dict(count=4)),
-        ("five poses", dict(count=5)),
-        ("twelve poses", dict(count=12)),
-        ("forty poses", dict(count=40)),
-        ("poses turned by more than 90 deg", dict(angle=2.2)),
-        ("poses next to the origin", dict(reach=3.0, tip=3.0, std=0.1)),
-        ("poses many meters away", dict(reach=5e4)),
-        ("poses that miss the point by some ten millimeters", dict(std=30.0)),
+        ("of three poses", dict(count=3)),
+        ("of four poses", dict(count=4)),
+        ("of five poses", dict(count=5)),
+        ("of twelve poses", dict(count=12)),
+        ("of forty poses", dict(count=40)),
+        ("of poses turned by more than 90 deg", dict(angle=2.2)),
+        ("of poses next to the origin", dict(reach=3.0, tip=3.0, std=0.1)),
+        ("of poses many meters away", dict(reach=5e4)),
+        ("of poses that miss the point by some ten millimeters", dict(std=30.0)),
+        ("where one pose is far beside the others", dict(outlier=40.0, count=12)),
     )
 )
 
@@ -141,6 +143,7 @@ RESIDUALS = tuple(
         ("of residuals of some ten-thousandths of a millimeter", dict(std=2e-4)),
         ("of residuals of some ten millimeters", dict(std=30.0)),
         ("where one pose is far beside the others", dict(outlier=40.0, count=12)),
+        ("where one pose of forty is far beside the others", dict(outlier=40.0, count=40)),
     )
 )
 
