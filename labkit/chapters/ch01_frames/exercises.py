@@ -124,6 +124,7 @@ def kuka_pose(rng, A_deg=(-170, 170), B_deg=(-80, 80), C_deg=(-170, 170)):
 
 
 A_RANGES = ((-80, 80), (100, 170), (-170, -100))  # deg: both signs of r00, and of r10
+C_RANGES = ((100, 170), (-80, 80), (-170, -100))  # deg: within and beyond 90 deg at every check, as A is
 B_RANGES = ((-80, -5), (5, 80), (-80, 80))  # deg: below and above 0 at every check
 QUADRANTS = ((10, 80), (100, 170), (-170, -100), (-80, -10))  # deg: both signs of sine and cosine
 NEAR_THE_POLE = ((88, 89), (-89.99, -89.98))  # deg: A and C are still two angles
@@ -438,7 +439,7 @@ def _at_both_poles(c):
     return variant
 
 
-def at_the_pole(sign):
+def at_the_pole(sign, last_bit=2**-52):
     """A draw at B = +-90 deg, with the rounding noise that a product of two matrices leaves."""
 
     def draw(rng):
@@ -446,10 +447,16 @@ def at_the_pole(sign):
         xyzabc[4] = sign * np.pi / 2
         turn = random_pose(rng)
         T = frames.invert(turn) @ (turn @ frames.matrix_from_kuka(xyzabc))
-        T[2, 0] = -sign * (1 + 2**-52)  # the least number above 1, as rounding may leave it
+        T[2, 0] = -sign * (1 + last_bit)  # the least number above 1, or the largest below, as rounding may leave it
         return (T,)
 
     return draw
+
+
+A_HAIR_BELOW_1 = tuple(
+    (f"at B = {90 * sign} deg, where rounding leaves r20 a hair short of {-sign}", at_the_pole(sign, -(2**-53)))
+    for sign in (1, -1)
+)
 
 
 def beside_the_axes(rng):
@@ -1325,8 +1332,8 @@ CHAPTER = Chapter(
             "kuka_from_matrix",
             reference=frames.kuka_from_matrix,
             draw=tuple(
-                lambda rng, A_deg=A_deg, B_deg=B_deg: (frames.matrix_from_kuka(kuka_pose(rng, A_deg, B_deg)[0]),)
-                for A_deg, B_deg in zip(A_RANGES, B_RANGES)
+                lambda rng, ranges=ranges: (frames.matrix_from_kuka(kuka_pose(rng, *ranges)[0]),)
+                for ranges in zip(A_RANGES, B_RANGES, C_RANGES)
             ),
             fixed={"T": POSE},
             metric=_read_by_kuka(1e-6),
@@ -1351,7 +1358,10 @@ CHAPTER = Chapter(
                 (functools.partial(half_turns, signs=signs), _read_by_kuka(1e-6), f"right, but not where {words}:")
                 for signs, words in (((-1, -1, 1), "A is 180 deg"), ((1, -1, -1), "C is 180 deg"))
             ],
-            properties=(right_where(frames.kuka_from_matrix, _read_by_kuka(1e-6), *special.READINGS),),
+            properties=(
+                right_where(frames.kuka_from_matrix, _read_by_kuka(1e-6), *special.READINGS),
+                right_where(frames.kuka_from_matrix, _read_by_kuka(1e-4), *A_HAIR_BELOW_1),
+            ),
             hints=(
                 "Compare the entries of Rz(A) Ry(B) Rx(C) that hold few terms: the first column gives A and B. Then undo A: "
                 "Rz(A)ᵀ R = Ry(B) Rx(C), whose middle row is 0, cos C, -sin C.",
