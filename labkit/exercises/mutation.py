@@ -61,6 +61,7 @@ OTHERS = {
     ast.Mod: (ast.FloorDiv,),
 }
 COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+ORDINALS = ("first", "second", "third")
 EQUALITIES = (ast.Eq, ast.NotEq)
 WITHOUT = {
     ast.Add: "without one of its terms",
@@ -1108,12 +1109,14 @@ def _is_guarded(name, args):
 
 
 def _comparison(node, names):
-    for kind, sign in COMPARISONS.items():
-        here = type(node.ops[0])
-        if len(node.ops) == 1 and here in COMPARISONS and kind is not here:
-            words = f"with `{sign}` where `{COMPARISONS[here]}` belongs"
+    for (i, op), (kind, sign) in itertools.product(enumerate(node.ops), COMPARISONS.items()):
+        here = type(op)
+        if here in COMPARISONS and kind is not here:
+            which = f"the {ORDINALS[i]} " if len(node.ops) > 1 and i < len(ORDINALS) else ""
+            words = f"with `{sign}` where {which}`{COMPARISONS[here]}` belongs"
             other = (kind in EQUALITIES) != (here in EQUALITIES)  # of numbers: a case never met, or always
-            yield 2 if other else 0, words, ast.Compare(node.left, [kind()], node.comparators)
+            ops = [*node.ops[:i], kind(), *node.ops[i + 1 :]]
+            yield 2 if other else 0, words, ast.Compare(node.left, ops, node.comparators)
 
 
 def _conditions(node, names):

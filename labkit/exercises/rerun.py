@@ -222,10 +222,10 @@ class Written:
         """What comes of every plan on one draw, in the plans' order, each handed to `keep`.
 
         A plan is ("code", number of a change), ("value", number of a place, number of one of `OTHERWISE`, number of an
-        argument), ("own", number of a place, number of one of `OTHERWISE`, number of the place where a variable was
-        bound before), ("argument", number of an argument, number of one of `OTHERWISE`), ("given", number of a place,
-        values in its place, one for every round), ("copy", number of a place), which puts a copy of its value there, or
-        ("last", number of a place), which gives the last of its values.
+        argument), ("own", number of a place, number of one of `OTHERWISE`, number of a place where a variable was
+        bound before, which is taken as it is by then), ("argument", number of an argument, number of one of
+        `OTHERWISE`), ("given", number of a place, values in its place, one for every round), ("copy", number of a
+        place), which puts a copy of its value there, or ("last", number of a place), which gives the last of them.
         Where one fails, `keep` gets None. The list is shorter where the time, in seconds, is over.
         """
         found = []
@@ -249,15 +249,25 @@ class Written:
                     return (self._made(self._noted, {NOTE: note})(*_given_otherwise(copies, *plan[1:])),)
                 if plan[0] == "last":
                     note = _Note(self.counted)
-                    note.watched = plan[1]
+                    note.watched = {plan[1]}
                     self._made(self._noted, {NOTE: note})(*copies)
                     return (note.seen,)
                 note = _Note(self.counted, plan[1])
-                note.watched = plan[3] if plan[0] == "own" else None
+                note.watched = self._bound_as(plan[3]) if plan[0] == "own" else ()
                 note.otherwise = _copied if plan[0] == "copy" else _but_for_copies(_otherwise(plan, copies, note))
                 return (self._made(self._noted, {NOTE: note})(*copies),)
         except (Exception, TooLong):  # a change may well make nonsense of a function
             return None
+
+    def _bound_as(self, place):
+        """Numbers of all places where the variable is bound that is bound at this one."""
+        line, _, name, *_ = self.places[place]
+        tree = next(tree for tree in self.trees if tree.lineno <= line <= tree.end_lineno)
+        return {
+            k
+            for k, (at, code, other, *_) in enumerate(self.places)
+            if name == other != code and tree.lineno <= at <= tree.end_lineno
+        }
 
     def _changed(self, number):
         with warnings.catch_warnings(action="ignore"), self._changes[number].made():
@@ -346,7 +356,8 @@ def _as_numbers(value):
 class _Note:
     """Is told every value on the way; keeps them, or puts others in the place of one."""
 
-    otherwise = watched = seen = None  # function(value, round); a place whose last value is seen
+    otherwise = seen = None  # function(value, round); the last value of the places that are watched
+    watched = ()
 
     def __init__(self, most, place=-1, kept=None):
         self.most, self.place, self.kept = most, place, kept
@@ -360,7 +371,7 @@ class _Note:
             self.kept[k].append(numeric(value))
             if _is_truth(value):
                 self.truths.add(k)
-        if k == self.watched:
+        if k in self.watched:
             self.seen = value
         if k == self.place:
             self.round += 1

@@ -1345,3 +1345,26 @@ def test_of_parts_that_look_alike_the_larger_part_is_quoted_as_well():
 def test_bounds_roundings_and_what_is_not_finite_are_told(reference, body, said):
     text = judged(asked(reference, far_apart), body)
     assert said in text and "?." not in text
+
+
+def test_a_variable_is_put_together_with_what_it_holds_by_then():
+    function = typed("""
+        least = 10.0
+        for k in range(3):
+            d = 2.0 * a[k]
+            if d < least:
+                least = d
+        return d
+        """)
+    found = rerun.written(function)
+    bound = [k for k, (_, code, name, *_) in enumerate(found.places) if name == "least" != code]
+    there = next(k for k, (_, code, *_) in enumerate(found.places) if code == "d" and k > bound[-1])
+    divided = next(k for k, (words, _) in enumerate(rerun.OTHERWISE) if words == "it is to be divided by {}")
+    drawn = (np.array([3.0, 2.0, 4.0]), np.zeros(3))
+    for variable in bound:
+        assert found.results([("own", there, divided, variable)], drawn, 1.0, lambda result: result) == [(2.0,)]
+
+
+def test_of_several_comparisons_in_a_row_it_is_said_which():
+    changes = rerun.written(typed("return 0 < a < b")).changes
+    assert any(mends == "the second `<` stands where `<=` belongs" for *_, mends in changes)
