@@ -67,6 +67,10 @@ class Metric:
         """(name, metric, result, expected) of the pieces that the general layer may diagnose one by one."""
         return [("", self, result, expected)]
 
+    def nearest(self, expected, result):
+        """What is expected, of all that it may be written as what is nearest to an admitted result."""
+        return expected
+
     def equal(self, result, expected):
         try:
             return all(d.within for d in self.deviations(self.admit(result, expected), expected))
@@ -272,6 +276,11 @@ class PlanarPoses(Metric):
             Deviation("the position", float(distance), "m", position.tolerance),
             Deviation("the heading", heading.amount, "deg", heading.tolerance),
         ]
+
+    def nearest(self, expected, result):
+        near = np.array(expected, dtype=float)
+        near[..., 2] += 2 * np.pi * np.round((result[..., 2] - near[..., 2]) / (2 * np.pi))
+        return near
 
 
 @dataclass(frozen=True)

@@ -119,7 +119,7 @@ class Value(Item):
         named = None if exact.equal(answer, expected) else self._mistake(answer, exact.equal)
         if named:
             return named
-        digits = 0 if _is_whole(expected) else relations.significant_digits(answer, expected)
+        digits = 0 if _is_whole(expected) else relations.significant_digits(answer, metric.nearest(expected, answer))
         if is_right or digits >= self.digits:
             return Outcome(CORRECT)
         named = self._mistake(
