@@ -12,7 +12,7 @@ from labkit.documents.lecture import printed as lecture
 from labkit.exercises import budget
 from labkit.exercises.outcome import CORRECT, NOT_YET
 from labkit.localization import lateration, odometry
-from tests.chapters.draws_of_a_check import SEEDS
+from tests.chapters.draws_of_a_check import SEEDS, is_missed, one_check
 
 ITEMS = {item.id: item for item in ch07.CHAPTER.items}
 
@@ -265,3 +265,68 @@ def by_the_hypotenuse(way, excess, track):
 def test_an_argument_is_not_called_right_where_another_one_belongs():
     text = ITEMS["wheel_offset"].judge(by_the_hypotenuse, rng=np.random.default_rng(0)).text
     assert "though `radius` in it is a value of the solution as well: look at what is done with it" in text
+
+
+def newton_until(step_below):
+    def answer(landmarks, distances, start):
+        x, step = np.array(start, dtype=float), np.inf
+        while np.linalg.norm(step) >= step_below:
+            step = np.linalg.solve(2 * (x - landmarks), ch07.lateration_residual(landmarks, distances, x))
+            x = x - step
+        return x
+
+    return answer
+
+
+def straight_below(omega):
+    return lambda x, u, dt: arc(x, u, dt, np.nextafter(omega, 0))
+
+
+def propagated_by_a_root(x, cov, u, dt, cov_u):
+    L = np.linalg.cholesky(cov_u)
+    return ch07.propagate(x, cov, u, dt, L @ L.T)
+
+
+def slopes_of_wrapped_steps(x, u, dt):
+    def step(x):
+        end = ch07.step_euler(x, u, dt)
+        return np.append(end[:2], np.angle(np.exp(1j * end[2])))
+
+    return np.column_stack([(step(x + e) - step(x - e)) / 2e-6 for e in 1e-6 * np.eye(3)])
+
+
+def by_the_largest_wheel(speeds, half_length, half_width):
+    largest = np.abs(speeds).max()
+    return largest * ch07.mecanum_twist(speeds / largest, half_length, half_width)
+
+
+@pytest.mark.parametrize(
+    "name, wrong, right",
+    [
+        ("newton_lateration", newton_until(1e-3), newton_until(1e-6)),
+        ("step_arc", straight_below(1e-4), ch07.step_arc),
+        ("propagate", propagated_by_a_root, ch07.propagate),
+        ("jacobian_state", slopes_of_wrapped_steps, ch07.jacobian_state),
+        ("mecanum_twist", by_the_largest_wheel, ch07.mecanum_twist),
+    ],
+)
+def test_what_is_wrong_at_one_place_alone_is_missed_there(name, wrong, right):
+    drawn = one_check(ITEMS[name])
+    with np.errstate(invalid="ignore"):
+        assert any(is_missed(wrong, *case) for case in drawn)
+    assert not any(is_missed(right, *case) for case in drawn)
+
+
+def test_a_rounded_pose_may_have_its_heading_wrapped():
+    item = ITEMS["end_pose"]
+    pose = item.reference() - [0.0, 0.0, 2 * np.pi]
+    assert item.judge(np.round(pose, 4)).status == CORRECT
+    assert item.judge(np.round(pose, 1)).status == NOT_YET
+
+
+def test_the_larger_part_of_the_noise_of_the_turn_rate_is_not_always_the_same():
+    parts = [
+        (k_theta * abs(u[1]), k_drift * abs(u[0]))
+        for (u, _, _, k_theta, k_drift), *_ in one_check(ITEMS["control_covariance"])[:3]
+    ]
+    assert len({turn > drift for turn, drift in parts}) == 2

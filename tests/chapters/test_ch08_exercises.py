@@ -561,3 +561,78 @@ def slopes_of_a_wrapped_bearing(x, landmark):
 def test_differences_across_the_seam_are_to_be_wrapped_and_no_other_seam_will_do():
     status, texts = judged("measurement_jacobian", slopes_of_a_wrapped_bearing)
     assert status == NOT_YET and all("`see(x + h * e) - see(x - h * e)`" in text for text in texts), texts
+
+
+def with_error(heading):
+    """NEES with another way to bring the error of the heading home."""
+
+    def answer(truth, x, cov):
+        e = np.append((truth - x)[:2], heading(truth[2] - x[2]))
+        return e @ np.linalg.solve(cov, e)
+
+    return answer
+
+
+def ekf_with(wrap=wrap_angle, root=lambda cov_u: cov_u, least=0.0):
+    """A step of the filter with one part otherwise; least: the surprise below which nothing is corrected."""
+
+    def answer(x, cov, u, dt, cov_u, z, landmark, cov_z):
+        moved, predicted = ch08._ekf(short=True, control=lambda cov_u, dt: root(cov_u))(
+            x, cov, u, dt, cov_u, z, landmark, cov_z
+        )
+        H, y = ch08.measurement_jacobian(moved, landmark), z - ch08.measurement(moved, landmark)
+        y[1] = wrap(y[1])
+        K = ch08._gain(predicted, H, cov_z)
+        corrected = moved + K @ y, ch08._shrunk(predicted, K, H)
+        return corrected if np.linalg.norm(y) >= least else (moved, predicted)
+
+    return answer
+
+
+def by_root(cov_u):
+    L = np.linalg.cholesky(cov_u)
+    return L @ L.T
+
+
+def sorted_by(key):
+    def answer(x0, var0, z, stds):
+        order = [key(z, stds).argmin(), key(z, stds).argmax()]
+        return ch08.fuse_two_sensors(x0, var0, z[order], stds[order])
+
+    return answer
+
+
+def open_at_half_a_turn(angle):
+    return wrap_angle(angle) if abs(wrap_angle(angle)) < np.pi else 0.0
+
+
+def differences_of_wrapped_steps(x, u, dt):
+    def slopes(f, at):
+        ends = [(f(at + e), f(at - e)) for e in 1e-6 * np.eye(len(at))]
+        return np.column_stack([(end - start) / 2e-6 for end, start in ends])
+
+    def step(x, u):
+        end = odometry.step(x, u, dt, "euler")
+        return np.append(end[:2], wrap_angle(end[2]))
+
+    return slopes(lambda x: step(x, u), x), slopes(lambda u: step(x, u), u)
+
+
+@pytest.mark.parametrize(
+    "name, wrong, right",
+    [
+        ("nees", with_error(lambda e: np.arcsin(np.sin(e))), with_error(lambda e: np.angle(np.exp(1j * e)))),
+        ("nees", with_error(lambda e: np.arctan(np.tan(e))), with_error(wrap_angle)),
+        ("ekf_step", ekf_with(wrap=lambda e: (e + np.pi / 2) % np.pi - np.pi / 2), ekf_with()),
+        ("ekf_step", ekf_with(root=by_root), ekf_with()),
+        ("ekf_step", ekf_with(least=1e-3), ekf_with()),
+        ("fuse_two_sensors", sorted_by(lambda z, stds: stds), sorted_by(lambda z, stds: np.arange(2))),
+        ("fuse_two_sensors", sorted_by(lambda z, stds: z), sorted_by(lambda z, stds: np.arange(2))),
+        ("wrap_angle", open_at_half_a_turn, lambda angle: np.pi - (np.pi - angle) % (2 * np.pi)),
+        ("motion_jacobians", differences_of_wrapped_steps, ch08.motion_jacobians),
+    ],
+)
+def test_what_is_wrong_at_one_place_alone_is_missed_there(name, wrong, right):
+    drawn = one_check(ITEMS[name])
+    assert any(is_missed(wrong, *case) for case in drawn)
+    assert not any(is_missed(right, *case) for case in drawn)

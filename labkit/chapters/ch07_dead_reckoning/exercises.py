@@ -42,6 +42,18 @@ def several_circles(rng, n):
     return landmarks, np.linalg.norm(landmarks - position, axis=1) * (1 + off), position
 
 
+def nearly_on_the_circles(rng):
+    """The same with distances that fit to within micrometers: residuals are small, and none of them is 0."""
+    landmarks, distances, position = several_circles(rng, 3)
+    return landmarks, np.linalg.norm(landmarks - position, axis=1) * (1 + 1e-8 * distances), position
+
+
+def measured_twice(rng):
+    """The same where one landmark stands twice in the list, with one distance."""
+    landmarks, distances, position = several_circles(rng, 3)
+    return landmarks[[0, 1, 1, 2]], distances[[0, 1, 1, 2]], position
+
+
 SITE = "right in a hall, but not on a site where the landmarks are a kilometer apart:"
 TABLE = "right in a hall, but not on a table where the landmarks are half a meter apart at most:"
 
@@ -72,6 +84,15 @@ def at_places(rng, robot, start, left, angle=None):
     frame = np.array([line, (1 if left else -1) * np.array([-line[1], line[0]])])
     robot, start = (landmarks[0] + rng.uniform(0.97, 1.03, 2) * place @ frame for place in (robot, start))
     return landmarks, np.linalg.norm(landmarks - robot, axis=1), start
+
+
+def from_a_millimeter_aside(rng):
+    """A start so near to a position close to the line through both landmarks that the first step is below a millimeter,
+    and ends micrometers beside it.
+    """
+    landmarks, distances, _ = at_places(rng, robot=(0.5, 0.02), start=(0.5, 0.02), left=rng.choice([True, False]))
+    robot, mirrored = lateration.circle_intersections(landmarks, distances)
+    return landmarks, distances, robot + rng.uniform(7e-4, 9e-4) * (robot - mirrored) / np.linalg.norm(robot - mirrored)
 
 
 def from_whole_meters(rng):
@@ -148,9 +169,9 @@ PLANAR = {"x": "a planar pose is always (x, y, theta)", "u": "a control is alway
 
 
 def gentle_curve(rng, omega):
-    """A pose, a control that turns slowly to one side, and a time step."""
-    x, u, dt = pose_control_step(rng)
-    return x, np.array([u[0], omega * rng.choice([-1, 1])]), dt
+    """A pose, a control that turns to one side by hardly less than omega, and a time step long enough to see it."""
+    x, _, _ = pose_control_step(rng)
+    return x, np.array([rng.uniform(1.5, 2), 0.9 * omega * rng.choice([-1, 1])]), rng.uniform(0.7, 0.9)
 
 
 def creeping(rng):
@@ -159,19 +180,34 @@ def creeping(rng):
     return x, 0.03 * u * rng.choice([-1, 1], 2), dt
 
 
+def exactly_backward(rng):
+    """A heading of exactly half a turn, to either side, at the end of the step as well."""
+    x, u, dt = pose_control_step(rng, gear=rng.choice([-1, 1]))
+    return np.array([*x[:2], np.pi * rng.choice([-1, 1])]), u * [1.0, 0.0], dt
+
+
 def wheels_nearly_alike(rng, apart):
     """Wheels of which one is faster by less than this (m/s), and the track."""
     speed, track = rng.uniform(0.2, 1) * rng.choice([-1, 1]), rng.uniform(0.2, 0.8)
     return speed, speed + rng.uniform(0.2, 1) * apart * rng.choice([-1, 1]), track
 
 
-def noisy_control(rng, signs):
-    """A control whose parts have these signs, a time step, and three noise constants."""
+def noisy_control(rng, signs, drifts=None):
+    """A control whose parts have these signs, a time step, and three noise constants.
+
+    drifts: whether the drift, and not the turn, makes the larger part of the turn rate's variance; by chance if None.
+    """
     v, omega = rng.uniform(0.3, 2), rng.uniform(0.2, 1.5)
-    return np.array([v, omega]) * signs, rng.uniform(0.05, 0.5), *rng.uniform(0.001, 0.02, 3)
+    dt, (k_d, k_theta, k_drift) = rng.uniform(0.05, 0.5), rng.uniform(0.001, 0.02, 3)
+    if drifts is not None and drifts != (k_drift * v > k_theta * omega):
+        k_theta, k_drift = k_drift * v / omega, k_theta * omega / v
+    return np.array([v, omega]) * signs, dt, k_d, k_theta, k_drift
 
 
-NOISY_CONTROLS = tuple(functools.partial(noisy_control, signs=signs) for signs in ((-1, 1), (1, -1), (-1, -1)))
+NOISY_CONTROLS = tuple(
+    functools.partial(noisy_control, signs=signs, drifts=drifts)
+    for signs, drifts in (((-1, 1), True), ((1, -1), False), ((-1, -1), True))
+)
 CREEPING = "right, but not for a robot that hardly moves and hardly turns (a few cm/s and hundredths of a rad/s):"
 
 
@@ -242,6 +278,14 @@ def special_steps(metric, small=None):
     turns = "right, but not where theta has gathered several full turns:"
     rows = (creeping, metric, CREEPING), *special_controls(metric), (gathered_turns, metric, turns)
     return *rows, *of_other_sizes(metric, small=small), (pose_of_integers, metric, OF_INTEGERS)
+
+
+BACKWARD = (
+    exactly_backward,
+    metrics.Numbers(1e-5),
+    "right, but not where the robot looks exactly backward, theta = pi or -pi, and drives straight on (a difference of two "
+    "headings is to be wrapped):",
+)
 
 
 def long_turn(rng, by):
@@ -770,6 +814,12 @@ CHAPTER = Chapter(
             fixed={"position": "a place in the plane"},
             metric=metrics.Numbers(1e-9),
             noisy=(
+                (measured_twice, metrics.Numbers(1e-9), "right, but not where a landmark stands twice in the list:"),
+                (
+                    nearly_on_the_circles,
+                    metrics.Numbers(1e-9),
+                    "right, but not where the position lies nearly on the circles, and all residuals are next to 0:",
+                ),
                 (
                     functools.partial(several_circles, n=30),
                     metrics.Numbers(1e-9),
@@ -873,6 +923,12 @@ CHAPTER = Chapter(
                     from_the_position_itself,
                     metrics.Numbers(1e-8, "m"),
                     "right, but not from a start that is the position itself:",
+                ),
+                (
+                    from_a_millimeter_aside,
+                    metrics.Numbers(1e-8, "m"),
+                    "right, but not from a start hardly a millimeter beside the position, where this is next to the line "
+                    "through both landmarks, and one step is not enough:",
                 ),
                 (
                     from_whole_meters,
@@ -1330,7 +1386,7 @@ CHAPTER = Chapter(
             draw=EITHER_WAY,
             fixed=PLANAR,
             metric=metrics.Numbers(1e-5),
-            noisy=special_steps(metrics.Numbers(1e-5), small=metrics.Numbers(1e-6)),
+            noisy=(BACKWARD, *special_steps(metrics.Numbers(1e-5), small=metrics.Numbers(1e-6))),
             hints=(
                 "Change x, y or theta a little: what does it change in the pose after the step?",
                 "A shift of x or y is passed on as it is. A turn of theta swings the way v T sideways.",
@@ -1424,7 +1480,7 @@ CHAPTER = Chapter(
             draw=EITHER_WAY,
             fixed=PLANAR,
             metric=metrics.Numbers(1e-5),
-            noisy=special_steps(metrics.Numbers(1e-5), small=metrics.Numbers(1e-6)),
+            noisy=(BACKWARD, *special_steps(metrics.Numbers(1e-5), small=metrics.Numbers(1e-6))),
             hints=(
                 "Three rows (x, y, theta), two columns (v, omega).",
                 "A little more v moves the robot by T along the heading; a little more omega turns it by T.",
@@ -1705,6 +1761,7 @@ CHAPTER = Chapter(
                     (functools.partial(scaled, draw=pose_and_covariances, factors=factors), POSE_AND_SMALL_COV, words)
                     for factors, words in (
                         ((1, 0, 1, 1, 1), "right, but not where the drive begins, with a covariance of zeros:"),
+                        ((1, 1, 1, 1, 0), "right, but not where the control is carried out exactly, cov_u = 0:"),
                         ((20, 1e-6, 1, 0.01, 1e-4), "right, but not for small covariances and short time steps:"),
                         (
                             (1, 1e4, 20, 10, 1e3),
@@ -2133,12 +2190,12 @@ CHAPTER = Chapter(
                 *(
                     (
                         functools.partial(scaled, draw=car, factors=factors),
-                        metrics.Numbers(1e-9),
+                        metrics.Numbers(1e-9, least=0.0),
                         f"right for a car, but not for {this}:",
                     )
                     for factors, this in (
                         ((20, 1, 6), "a fast truck, more than 3.5 m between its axles"),
-                        ((0.003, 1, 0.1), "a slow model of one, less than 40 cm between its axles, at 1 cm/s at most"),
+                        ((1e-4, 1, 0.1), "a slow model of one, less than 40 cm between its axles, at less than 1 mm/s"),
                     )
                 ),
             ),
@@ -2225,6 +2282,7 @@ CHAPTER = Chapter(
                     for factors, words in (
                         ((20, 10, 10), "right, but not for a large and fast robot, several meters long:"),
                         ((1e-3, 0.1, 0.1), "right, but not for a small and slow robot, a few mm/s:"),
+                        ((0, 1, 1), "right, but not for a robot at rest, whose wheels all stand:"),
                     )
                 ),
             ),

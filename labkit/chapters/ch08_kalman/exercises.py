@@ -41,6 +41,12 @@ def known_exactly(rng):
     return x, 0.0 * cov, A, B, 0.0 * u, cov_u
 
 
+def carried_out_exactly(rng):
+    """A control of which nothing is uncertain."""
+    x, cov, A, B, u, cov_u = prediction(rng, 3, 2)
+    return x, cov, A, B, u, 0.0 * cov_u
+
+
 def mixed_measurement(rng, n, m, off=1.0, sure=1.0, unit=1.0):
     """State of n, and m numbers measured of mixtures of them; off: how far they are from those expected; sure: how
     small the covariances are; unit: what the sensor shows where a state changes by 1 (a gain may well be above 1).
@@ -82,6 +88,18 @@ def two_sensors_alike(rng):
     return x0, var0, z[[0, 0]], stds[[0, 0]]
 
 
+def equally_good_sensors(rng):
+    """The same with two sensors that are equally good, and disagree."""
+    x0, var0, z, stds = one_position_two_sensors(rng)
+    return x0, var0, z + rng.uniform(1, 3, 2) * [1, -1], stds[[0, 0]]
+
+
+def two_equal_readings(rng, better):
+    """The same with two readings that are one number, of sensors that are not equally good."""
+    x0, var0, z, stds = one_position_two_sensors(rng, better)
+    return x0, var0, z[[0, 0]], stds
+
+
 def two_sharp_sensors(rng):
     """The same a kilometer away, known to millimeters."""
     x0, var0, z, stds = one_position_two_sensors(rng)
@@ -119,6 +137,13 @@ def steady_system(rng, n, m, sure=1.0):
         covariance(rng, n, 0.05 * sure),
         covariance(rng, m, 0.3 * sure),
     )
+
+
+def forgetful_system(rng):
+    """The same where a state is made anew at every step, of the others: A has no inverse."""
+    A, C, cov_v, cov_z = steady_system(rng, n=3, m=2)
+    A[0, 0] = 0.0
+    return A, C, cov_v, cov_z
 
 
 def growing_system(rng):
@@ -205,6 +230,12 @@ def seen_from_whole_numbers(rng):
     return whole, whole[:2] + landmark - x[:2]
 
 
+def pose_exactly_backward(rng):
+    """A pose whose heading is exactly half a turn, and a control that leaves it so."""
+    x, u, dt = pose_control_step(rng, ahead=rng.choice([-1, 1]))
+    return np.array([*x[:2], np.pi * rng.choice([-1, 1])]), u * [1.0, 0.0], dt
+
+
 def landmark_ahead(rng):
     """A landmark hardly to the left or to the right of where the robot looks."""
     return landmark_seen_at(rng, rng.uniform(5e-4, 1e-3) * rng.choice([-1, 1]))
@@ -217,6 +248,11 @@ def within_half_a_turn(rng):
 def about_half_a_turn(rng, sign, beyond):
     """An angle hardly short of half a turn, or hardly beyond."""
     return (sign * (np.pi + beyond * rng.uniform(0.002, 0.02)),)
+
+
+def half_a_turn(rng, sign):
+    """Exactly half a turn."""
+    return (sign * np.pi,)
 
 
 def turned_too_far(rng, sign, gathered):
@@ -266,17 +302,27 @@ def fast_control(rng):
 
 
 def filter_step(
-    rng, ahead=1, astray=0.2, side=1, seam=True, moves=(1, 1), turns=0, within=(2, 5), sure=1.0, turned=(0.06, 0.12)
+    rng,
+    ahead=1,
+    astray=0.2,
+    side=1,
+    seam=True,
+    moves=(1, 1),
+    turns=0,
+    within=(2, 5),
+    sure=1.0,
+    turned=(0.06, 0.12),
+    carried_out=False,
 ):
     """Everything one step of the landmark filter needs; the bearing innovation crosses +-pi if this is a seam.
 
     astray: how far the measured distance may be off (m); side: of the innovation of the bearing; moves: parts of the
     control that are not zero; turns: that the heading has gathered; within: range of the landmark's distance (m);
-    sure: how small the covariances are; turned: range of the innovation of the bearing.
+    sure: how small the covariances are; turned: range of the innovation of the bearing; carried_out: the control exactly.
     """
     x, u, dt = pose_control_step(rng, ahead)
     x, u = x + [0.0, 0.0, 2 * np.pi * turns], u * moves
-    cov, cov_u = covariance(rng, 3, 0.01 * sure), covariance(rng, 2, 0.02 * sure)
+    cov, cov_u = covariance(rng, 3, 0.01 * sure), covariance(rng, 2, 0.0 if carried_out else 0.02 * sure)
     moved = odometry.step(x, u, dt, "euler")
     away = moved[2] + side * (np.pi - rng.uniform(0.005, 0.03) if seam else rng.uniform(0.2, 1.5))
     landmark = moved[:2] + rng.uniform(*within) * np.array([np.cos(away), np.sin(away)])
@@ -286,13 +332,13 @@ def filter_step(
     return x, cov, u, dt, cov_u, z, landmark, covariance(rng, 2, 0.003 * sure)
 
 
-def estimate_and_truth(rng, side=1, astray=0.3, turns=0, sure=0.05):
-    """True and estimated pose whose headings lie on both sides of +-pi, and a covariance; errors up to `astray` m, and
-    so many full turns that only the estimate has counted.
+def estimate_and_truth(rng, side=1, astray=0.3, turns=0, sure=0.05, turned=(0.15, 0.3)):
+    """True and estimated pose whose headings lie on both sides of +-pi, and a covariance; errors up to `astray` m and
+    in the range `turned` (rad), and so many full turns that only the estimate has counted.
     """
     truth = np.array([*rng.uniform(-4, 4, 2), side * (np.pi - rng.uniform(0.02, 0.1))])
     off = rng.uniform(0.8, 1.0, 2) * astray * rng.choice([-1, 1], 2)
-    return truth, truth + [*off, side * (rng.uniform(0.15, 0.3) - 2 * np.pi * (1 + turns))], covariance(rng, 3, sure)
+    return truth, truth + [*off, side * (rng.uniform(*turned) - 2 * np.pi * (1 + turns))], covariance(rng, 3, sure)
 
 
 def estimate_without_error(rng):
@@ -892,6 +938,11 @@ CHAPTER = Chapter(
                     STATE_AND_COV,
                     "right, but not where the state is known exactly, cov = 0, and the control is zero, though uncertain:",
                 ),
+                (
+                    carried_out_exactly,
+                    STATE_AND_COV,
+                    "right, but not where the control is carried out exactly, cov_u = 0:",
+                ),
             ),
             hints=(
                 "The state follows the model; its uncertainty is carried along, and that of the control is added.",
@@ -1243,6 +1294,15 @@ CHAPTER = Chapter(
                     "right where the sensors agree. Where they are far apart the weights stay what they are:",
                 ),
                 (prior_at_zero, FUSED, "right, but not where the prior says 0: that is a position like any other:"),
+                (equally_good_sensors, FUSED, "right, but not for two equally good sensors that do not agree:"),
+                *(
+                    (
+                        functools.partial(two_equal_readings, better=better),
+                        FUSED,
+                        "right, but not for two equal readings of sensors that are not equally good:",
+                    )
+                    for better in (0, 1)
+                ),
                 (two_sensors_alike, FUSED, "right, but not for two equal readings of equally good sensors:"),
                 (
                     two_sharp_sensors,
@@ -1433,6 +1493,7 @@ CHAPTER = Chapter(
                 functools.partial(steady_system, n=3, m=2),
                 functools.partial(steady_system, n=2, m=2),
                 steady_vehicle,
+                functools.partial(steady_system, n=3, m=1),
             ),
             metric=metrics.Numbers(1e-3),
             noisy=(
@@ -1446,6 +1507,11 @@ CHAPTER = Chapter(
                     growing_system,
                     metrics.Numbers(1e-3),
                     "right, but not for a system of which a state grows by itself, by an eigenvalue of A above 1:",
+                ),
+                (
+                    forgetful_system,
+                    metrics.Numbers(1e-3),
+                    "right, but not for a system that forgets a state from step to step, so that A has no inverse:",
                 ),
                 (functools.partial(steady_system, n=1, m=1), metrics.Numbers(1e-3), ONE_STATE),
                 *(
@@ -1691,6 +1757,14 @@ CHAPTER = Chapter(
                     )
                     for draw in each_way(about_half_a_turn, "sign", "beyond")
                 ),
+                *(
+                    (
+                        functools.partial(half_a_turn, sign=sign),
+                        metrics.UpToSign(1e-9, "rad"),
+                        "right, but not at exactly half a turn, pi or -pi, either of which is right for both:",
+                    )
+                    for sign in (1, -1)
+                ),
             ),
             draws=12,
             hints=(
@@ -1788,6 +1862,14 @@ CHAPTER = Chapter(
                 *along_the_axes(metrics.Numbers(1e-9)),
                 *near_and_far(metrics.Numbers(1e-9)),
                 (landmark_ahead, metrics.Numbers(1e-9), "right, but not where the robot looks nearly at the landmark:"),
+                *(
+                    (
+                        functools.partial(landmark_behind, side=side),
+                        metrics.Numbers(1e-9),
+                        "right, but not where the landmark stands nearly behind the robot:",
+                    )
+                    for side in (1, -1)
+                ),
                 (seen_from_whole_numbers, metrics.Numbers(1e-9), OF_INTEGERS),
             ],
             hints=(
@@ -2067,6 +2149,12 @@ CHAPTER = Chapter(
             + (
                 (control_at_whole_numbers, JACOBIANS, OF_INTEGERS),
                 (
+                    pose_exactly_backward,
+                    JACOBIANS,
+                    "right, but not where the robot looks exactly backward, theta = pi or -pi, and drives straight on (a "
+                    "difference of two headings is to be wrapped):",
+                ),
+                (
                     fast_control,
                     JACOBIANS,
                     "right, but not for a heading that has gathered turns, a fast control and a time step of seconds:",
@@ -2206,6 +2294,18 @@ CHAPTER = Chapter(
                         {"within": (0.8, 1.2), "seam": False, "turned": (1.0, 1.4)},
                         "for a landmark a meter away and a bearing that is off by a radian",
                     ),
+                    *(
+                        (
+                            {"seam": False, "side": side, "turned": (1.8, 2.6)},
+                            "for a bearing that is off by more than a quarter turn: wrapping takes off whole turns alone",
+                        )
+                        for side in (1, -1)
+                    ),
+                    (
+                        {"seam": False, "astray": 0.0, "turned": (0.0, 0.0)},
+                        "where just what was expected is measured: the covariance shrinks all the same",
+                    ),
+                    ({"seam": False, "carried_out": True}, "where the control is carried out exactly, cov_u = 0"),
                     ({"within": (60, 90), "sure": 30.0}, "for a landmark 60 m away and uncertainties that are large"),
                 )
             ),
@@ -2400,6 +2500,14 @@ CHAPTER = Chapter(
             fixed={"truth": POSE, "x": POSE, "cov": POSE},
             metric=metrics.Numbers(1e-8),
             noisy=(
+                *(
+                    (
+                        functools.partial(estimate_and_truth, side=side, turns=turns, turned=(1.8, 2.9)),
+                        metrics.Numbers(1e-8),
+                        "right, but not where the heading is off by more than a quarter turn: wrapping takes off whole turns alone:",
+                    )
+                    for side, turns in ((1, 0), (-1, 0), (1, -1))
+                ),
                 (estimate_without_error, metrics.Numbers(1e-8), "right, but not where the estimate is the truth:"),
                 (
                     sharp_estimate,

@@ -94,12 +94,15 @@ def small_turns(rng):
     return some_motions(rng, int(rng.integers(1, 4)), turns=(2e-4, 4e-3))
 
 
-def fitted_line(rng, freedom=(4, 8), p=None, unlike=False, alone=False, unused=False, size=1.0, noise=(0.2, 4.0)):
+def fitted_line(
+    rng, freedom=(4, 8), p=None, unlike=False, alone=False, unused=False, twice=False, size=1.0, noise=(0.2, 4.0)
+):
     """Residuals of a linear fit of p parameters to n numbers, and its derivative.
 
     freedom: the least and the largest n - p. unlike: the parameters have units of very different size, as radians
     beside millimeters. alone: one number pays for nearly all of a parameter, its share is above 0.999. unused: one number
-    does not depend on the parameters. size: of the derivative, as the unit of the parameters makes it. noise: its least
+    does not depend on the parameters. twice: two numbers are equal, and so are their rows, as where a reading stands in
+    a file twice. size: of the derivative, as the unit of the parameters makes it. noise: its least
     and largest standard deviation.
     """
     p = p or int(rng.integers(2, 6))
@@ -108,6 +111,8 @@ def fitted_line(rng, freedom=(4, 8), p=None, unlike=False, alone=False, unused=F
     J *= size
     if unused:
         J[int(rng.integers(n))] = 0.0
+    if twice:
+        J[-1], noise[-1] = J[0], noise[0]
     if unlike:
         J *= 10.0 ** rng.permutation(np.linspace(-1.7, 1.7, p))
     if alone:
@@ -122,6 +127,12 @@ def information(rng, p=None):
     p = p or int(rng.integers(3, 7))
     M = rng.normal(size=(p, p + 2)) * rng.uniform(0.02, 3.0, (p, 1))
     return M @ M.T + 1e-3 * np.diag(rng.uniform(0.5, 1.5, p))
+
+
+def numbers_alike(rng):
+    """A covariance, and a reading of which two numbers are of the same kind."""
+    C, J = covariance_and_reading(rng, k=3)
+    return C, J[[0, 1, 1]]
 
 
 def covariance_and_reading(rng, more=None, k=None, p=None, unit=1.0, unlike=0.0):
@@ -673,7 +684,12 @@ CHAPTER = Chapter(
             reference=left_out,
             draw=fitted_line,
             metric=metrics.Numbers(1e-7),
-            noisy=[*special_fits(fitted_line, metrics.Numbers(1e-7)), *of_other_noise(metrics.Numbers(1e-7, least=0.0))],
+            noisy=[
+                (functools.partial(fitted_line, twice=True), metrics.Numbers(1e-7),
+                 "right, but not where a number stands there twice, with the same row of J: one of the two alone is left out:"),
+                *special_fits(fitted_line, metrics.Numbers(1e-7)),
+                *of_other_noise(metrics.Numbers(1e-7, least=0.0)),
+            ],
             hints=(
                 "A number that is fitted pulls the fit toward itself. Its share is h = j^T (J^T J)^-1 j, with j its row of J.",
                 "Of its own error only 1 - h is left in the residual: divide by that.",
@@ -790,6 +806,7 @@ CHAPTER = Chapter(
                    "right for a reading of fewer numbers than there are parameters, but not for one of as many, or more:")
                   for more in (0, 2)),
                 (functools.partial(covariance_and_reading, k=1), metrics.Numbers(1e-7), "right for several numbers, but not for a reading of a single one:"),
+                (numbers_alike, metrics.Numbers(1e-7), "right, but not where two numbers of the reading have the same row of J: each counts:"),
                 (functools.partial(covariance_and_reading, p=1, k=2), metrics.Numbers(1e-7), "right for several parameters, but not for one, p = 1:"),
                 (functools.partial(covariance_and_reading, p=12, k=6), metrics.Numbers(1e-7), "right for few parameters, but not for twelve, as a hand-eye calibration has:"),
                 (functools.partial(covariance_and_reading, unlike=4.0), metrics.Numbers(1e-7),
