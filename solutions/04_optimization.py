@@ -383,7 +383,8 @@ def dogleg_step(g, B, radius):
 def trust_region(residual, jacobian, x, radius, steps):
     """Return x, shape (n,), and the radius, a number, after so many rounds (steps).
 
-    residual(x): (m,); jacobian(x): (m, n); x, radius: those of the start."""
+    residual(x): (m,); jacobian(x): (m, n); x, radius: those of the start. n may be more
+    than 2: whatever you call here, dogleg_step say, must take that many unknowns."""
     ### BEGIN SOLUTION
     for _ in range(steps):
         r, J = residual(x), jacobian(x)

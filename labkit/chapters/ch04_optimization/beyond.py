@@ -45,12 +45,20 @@ def far_and_step(rng):
     return f, x + 20 * rng.choice([-1, 1], len(x)), h
 
 
+def some_at_nought(rng):
+    """The same at a place of which some unknowns are 0."""
+    f, x, h = function_and_step(rng)
+    x[: len(x) - 1] = 0
+    return f, rng.permutation(x), h
+
+
 MEASURED = (  # draw, tolerance, least size it is relative to, words
     (functools.partial(function_and_step, n=1), 1e-9, 1.0, "right, but not of a function of one unknown:"),
     (functools.partial(function_and_step, n=8), 1e-9, 1.0, "right, but not of a function of eight unknowns:"),
     (functools.partial(function_and_step, step=(3e-5, 1e-4)), 1e-8, 1.0, "right, but not with a step below 1e-4:"),
     (functools.partial(function_and_step, step=(1, 3)), 1e-9, 1.0, "right, but not with a step above 1:"),
     (far_and_step, 1e-9, 1.0, "right, but not far from 0:"),
+    (some_at_nought, 1e-9, 1.0, "right, but not where unknowns are 0:"),
     (faint_function_and_step, 1e-7, 0.0, "right, but not of a function that hardly changes, its slopes below 1e-5:"),
 )
 
@@ -135,12 +143,48 @@ def sized_hills(rng, size):
     return sized(f, size), *others
 
 
+def two_hills(rng):
+    """A chord above which the function rises twice, and comes down to it between: the larger rise comes second."""
+    while True:
+        f, x = wavy(rng)
+        y, n = x + rng.normal(scale=2.5, size=len(x)), int(rng.integers(12, 25))
+        _, values, heights = chord(f, x, y, n)
+        gap = values - heights
+        best = int(np.argmax(gap))
+        valley = int(np.argmin(gap[:best])) if best else 0
+        if valley and 0.1 < gap[:valley].max(initial=0.0) < 0.8 * gap[best] and gap[valley] < -0.05:
+            return f, x, y, n
+
+
+ONE_TOO_MANY = [n for n in range(6, 40) if len(np.arange(0, 1 + 1 / (n - 1), 1 / (n - 1))) > n]
+
+
+def rising_behind_the_end(rng):
+    """A chord behind whose end the function rises more than anywhere above it, and so many places that steps of
+    1 / (n - 1), as of `np.arange`, may by rounding go one too far.
+    """
+    while True:
+        f, x = wavy(rng)
+        y, n = x + rng.normal(scale=1.5, size=len(x)), int(rng.choice(ONE_TOO_MANY))
+        _, values, heights = chord(f, x, y, n)
+        t = n / (n - 1)
+        if f((1 - t) * x + t * y) - (1 - t) * values[0] - t * values[-1] > (values - heights).max() + 0.05:
+            return f, x, y, n
+
+
 CHORDS = (  # draw, tolerance, least size it is relative to, words
     (both_ends, 1e-9, 1.0, "right, but not where both ends alone are looked at:"),
     (three_places, 1e-9, 1.0, "right, but not where three places are looked at:"),
     (functools.partial(hilly, falls=False, places=(200, 400)), 1e-9, 1.0, "right, but not of hundreds of places:"),
     (functools.partial(hilly, falls=False, unknowns=1), 1e-9, 1.0, "right, but not of a function of one unknown:"),
     (one_place, 1e-9, 1.0, "right, but not where x and y are one place:"),
+    (two_hills, 1e-9, 1.0, "right, but not where f rises above the chord twice, and more the second time:"),
+    (
+        rising_behind_the_end,
+        1e-9,
+        1.0,
+        "right, but not where f rises on behind y (is a place looked at that lies behind the end?):",
+    ),
     (functools.partial(sized_hills, size=1e-9), 1e-5, 0.0, "right, but not where f rises by some 1e-9 only:"),
     (functools.partial(sized_hills, size=1e6), 1e-9, 1.0, "right, but not where f rises by hundreds of thousands:"),
 )
@@ -308,6 +352,11 @@ def shrunk_where_taken_back(radius, length, rho):
     return radius if ACCEPT < rho < POOR else rule(radius, length, rho)
 
 
+def no_praise_for_luck(radius, length, rho):
+    """The rule, but for steps that bring far more than was promised: the radius stays."""
+    return radius if rho > 1.6 else rule(radius, length, rho)
+
+
 SHRINKS = {  # what else the radius may become after a poor step
     "a quarter of what it was": lambda radius, length: radius / 4,
     "half of what it was": lambda radius, length: radius / 2,
@@ -430,6 +479,21 @@ def just_good(rho, inside):
     return rho[0] > GOOD and rho[0] < 0.795 and not inside[0]
 
 
+def better_than_promised(rho, inside):
+    """A step to the rim, first of all, that brings much more than the model promised."""
+    return rho[0] > 1.6 and not inside[0]
+
+
+def taken_back_at_once(rng):
+    """One round, whose step is taken back."""
+    while True:
+        *problem, radius = *_problem(rng), float(rng.uniform(1, 4))
+        seen = []
+        descend(*problem, radius, 1, seen=seen)
+        if -3 < seen[0][0] < -0.05:
+            return *problem, radius, 1
+
+
 def sized_run(rng, size):
     """A run in which much happens, of a problem so many times as large as another."""
     residual, jacobian, x, radius, steps = run_with(rng, poor_inside)
@@ -482,6 +546,11 @@ def _limit(wanted, first, **unlike):
 
 
 AT_THE_LIMITS = (
+    (
+        _limit(better_than_promised, (1.7, 2.6), follow=no_praise_for_luck),
+        "right, but not where a step to the rim brings far more than was promised. A ρ above 1 is above ¾:",
+    ),
+    (taken_back_at_once, "right, but not of one round, whose step is taken back:"),
     (
         _limit(just_fair, (0.705, 0.735), follow=functools.partial(rule, good=0.7)),
         "right, but not where a step to the rim has a ρ just below ¾:",
