@@ -48,6 +48,16 @@ def test_linear_start_in_the_base_needs_a_rotation_on_noisy_data(nearest, status
     assert all(judged("linear_start", start, seed).status == status for seed in range(5))
 
 
+def test_a_reflection_is_not_mended_by_all_of_its_signs():
+    def fit(T_BF, x_S):
+        moved = -(T_BF[:, :3, 3] - T_BF[:, :3, 3].mean(axis=0)) @ T_BF[0, :3, :3]
+        U, _, Vt = np.linalg.svd(moved.T @ (x_S - x_S.mean(axis=0)))
+        R = U @ Vt
+        return -R if np.linalg.det(R) < 0 else R
+
+    assert all("you change all of its signs" in judged("li_rotation", fit, seed).text for seed in range(3))
+
+
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_constant_side_is_never_accepted(sign):
     def center(x, z, radius, side):

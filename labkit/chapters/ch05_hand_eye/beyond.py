@@ -330,6 +330,11 @@ def _without_det(R, t, x):
     return U @ Vt
 
 
+def _all_signs_turned(R, t, x):
+    U, _, Vt = np.linalg.svd(-(t @ R).T @ x)
+    return U @ Vt * np.linalg.det(U @ Vt)
+
+
 def _fit(moved, seen):
     return nearest_rotation(moved.T @ seen)
 
@@ -959,6 +964,12 @@ LITERATURE = [
                 _rotation(_without_det),
                 "Where all moves lie in one plane, U Vᵀ can be a reflection. `nearest_rotation` looks at the determinant.",
                 id="li-reflection",
+            ),
+            Mistake(
+                _rotation(_all_signs_turned),
+                "Where all moves lie in one plane, U Vᵀ can be a reflection, and you change all of its signs: that is a rotation, half a turn away "
+                "from the nearest one. Only the last column of U changes its sign: `nearest_rotation` does it.",
+                id="li-reflection-all-signs",
             ),
             Mistake(
                 _rotation(lambda R, t, x: (-t @ R).T @ x),

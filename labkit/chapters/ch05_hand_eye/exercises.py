@@ -15,6 +15,7 @@ from ...exercises import metrics
 from ...exercises.engine import Chapter, Exercise, Prediction
 from ...exercises.outcome import Mistake
 from ...exercises.value import Value
+from ...exercises.whole import QUARTER_TURNS
 from ...geometry import frames, lie
 from ...geometry.chaining import orthonormality_error
 from ...geometry.lie import exp_so3, skew
@@ -123,6 +124,12 @@ def pose_off(rng, n=None, turn=0.15, shift=8):
     )
 
 
+def close_to_the_scanner(rng):
+    """The same without the target, of a sphere so close to the scanner's origin that a turn moves it as little as a shift."""
+    T_FS, T_BF, x_S, _ = pose_off(rng)
+    return T_FS, T_BF, 1e-3 * x_S
+
+
 def few_poses(rng):
     """Three poses that determine the step well."""
     while True:
@@ -131,8 +138,19 @@ def few_poses(rng):
             return T_FS, T_BF, x_S, target
 
 
+def fitting_exactly(rng):
+    """A scanner pose from which nothing is left over, in quarter turns and whole millimeters: the step is 0, not nearly."""
+    T_FS = frames.pose(QUARTER_TURNS[rng.integers(24)].astype(float), rng.integers(-150, 150, 3).astype(float))
+    n, target = int(rng.integers(9, 14)), rng.integers(-900, 900, 3).astype(float)
+    x_S = np.column_stack([rng.integers(-25, 25, n), rng.integers(-20, 20, n), rng.integers(190, 290, n)]).astype(float)
+    R = QUARTER_TURNS[rng.permutation(24)[:n]].astype(float)
+    return T_FS, frames.pose(R, target - (R @ frames.transform(T_FS, x_S)[..., None])[..., 0]), x_S, target
+
+
 def one_far_off(rng):
-    """A scanner pose a little off the truth, and one sphere center off by a decimeter and more."""
+    """A scanner pose a little off the truth, and one sphere center off by a decimeter and more: good differences, off by
+    1e-8, leave some 1e-6 mm of that.
+    """
     T_FS, T_BF, x_S, target = pose_off(rng, turn=0.03, shift=3)
     x_S[rng.integers(len(x_S))] += rng.choice([-1, 1], 3) * rng.uniform(80, 160, 3)
     return T_FS, T_BF, x_S, target
@@ -168,6 +186,13 @@ def smooth_function(rng, m=None, n=None, step=(0.03, 0.08), size=1.0, away=0.0):
     M, c = rng.normal(size=(m, n)), rng.normal(size=m)
     x = rng.normal(size=n) + away * rng.choice([-1, 1], n)
     return (lambda x: size * (np.sin(M @ x) + c * (x @ x))), x, float(rng.uniform(*step))
+
+
+def some_at_nought(rng):
+    """A curved function at a place of which some variables are 0."""
+    f, x, step = smooth_function(rng)
+    x[: len(x) - 1] = 0
+    return f, rng.permutation(x), step
 
 
 def returning_a_view(rng):
@@ -253,6 +278,13 @@ def increments(rng, n=None, turn=0.2):
     """Nine unknowns around a start pose, with the poses and centers they are judged by."""
     T_FS, T_BF, x_S, target = scene(rng, n)
     return np.concatenate([rng.normal(size=3) * turn, rng.normal(size=3) * 10, target]), T_FS, T_BF, x_S
+
+
+def beyond_half_a_turn(rng):
+    """The same with a rotation vector longer than half a turn, as long as a whole one at most."""
+    u, *others = increments(rng)
+    u[:3] *= rng.uniform(3.5, 6) / np.linalg.norm(u[:3])
+    return u, *others
 
 
 def residuals_with_outliers(rng, odd=0, n=None, gross=4, size=1.0):
@@ -1157,7 +1189,10 @@ CHAPTER = Chapter(
                 (functools.partial(smooth_function, **special), metrics.Numbers(tol, least=least), words)
                 for special, tol, least, words in SPECIAL_FUNCTIONS
             )
-            + ((returning_a_view, metrics.Numbers(1e-9), VIEW),),
+            + (
+                (some_at_nought, metrics.Numbers(1e-9), "right, but not where variables are 0:"),
+                (returning_a_view, metrics.Numbers(1e-9), VIEW),
+            ),
             hints=(
                 "Move one variable at a time, and look at the function ahead and behind.",
                 "Column k is (f(x + h e_k) - f(x - h e_k)) / (2 h), with e_k the k-th unit vector.",
@@ -1208,6 +1243,7 @@ CHAPTER = Chapter(
             draw=tuple(lambda rng, n=n: pose_off(rng, n)[:3] for n in COUNTS),
             fixed={"T_FS": POSE},
             metric=metrics.Numbers(1e-6),  # good differences are right as well
+            noisy=((close_to_the_scanner, metrics.Numbers(1e-5), "right, but not of a sphere within a millimeter of the scanner's origin:"),),
             hints=(
                 "Insert T_FS exp(phi) into the residual and keep what is linear in phi and in the translation.",
                 "R_BF R_FS exp(phi) x = R_BF R_FS (x + phi x x) = ... - R_BF R_FS [x] phi; the translation enters through R_BF alone.",
@@ -1256,7 +1292,8 @@ CHAPTER = Chapter(
                 (uphill, metrics.Poses(1e-5, 1e-5), "right, but not from a start so far off that the residuals grow with the step. Gauss-Newton takes it whole all the same:"),
                 (functools.partial(pose_off, turn=1e-6, shift=1e-4), metrics.Poses(1e-6, 1e-6), "right, but not from a start that is off by less than 0.001 mm and a millionth of a rad:"),
                 (few_poses, metrics.Poses(1e-4, 1e-4), "right, but not of three poses:"),
-                (one_far_off, metrics.Poses(1e-6, 1e-6), "right, but not where one sphere center is far off. Gauss-Newton's step hears it like all others:"),
+                (fitting_exactly, metrics.Poses(1e-6, 1e-6), "right, but not from a start that fits exactly, from where the step is 0:"),
+                (one_far_off, metrics.Poses(1e-5, 1e-5), "right, but not where one sphere center is far off. Gauss-Newton's step hears it like all others:"),
             ),
             hints=(
                 "Solve the linearized problem for the step, then move the pose by it.",
@@ -1327,6 +1364,7 @@ CHAPTER = Chapter(
                  "Right where phi turns. Where phi is 0, as at the start of a search, exp(phi) is I:"),
                 (functools.partial(increments, turn=3e-7), metrics.Numbers(1e-9, "mm"), "right, but not where phi is some 1e-7 rad:"),
                 (functools.partial(increments, turn=2.0), metrics.Numbers(1e-9, "mm"), "right, but not where phi turns far:"),
+                (beyond_half_a_turn, metrics.Numbers(1e-9, "mm"), "right, but not where phi is longer than half a turn:"),
             ),
             fixed={"u": "nine unknowns", "T0": POSE},
             metric=metrics.Numbers(1e-9, "mm"),
