@@ -6,6 +6,7 @@ is right, in every check, and whoever is wrong there hears of the place.
 """
 
 import copy
+import inspect
 
 from . import metrics
 from .budget import seconds
@@ -38,6 +39,22 @@ def right_where(reference, metric, *places):
             if told:
                 return f"right so far, but not {words}: {told}."
         return None
+
+    return holds
+
+
+def default_is(name, value):
+    """A property for `Exercise.properties`: an argument that may be left out is then what it is in the cell as given.
+
+    Whoever has no default at all hears of it where the function is called without.
+    """
+
+    def holds(student, rng):
+        parameter = inspect.signature(student).parameters.get(name)
+        found = value if parameter is None or parameter.default is parameter.empty else parameter.default
+        if isinstance(found, int | float) and found == value:
+            return None
+        return f"right, but where `{name}` is left out it is {found!r} in yours, in the cell as it was given {value!r}."
 
     return holds
 

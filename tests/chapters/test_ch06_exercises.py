@@ -456,5 +456,24 @@ def test_who_makes_one_part_positive_is_told_which(part, name):
     assert all(f"You made {name} positive" in text for text in texts("mean_quaternion", mean))
 
 
+def test_an_argument_that_is_left_out_is_what_it_is_in_the_cell():
+    def keep(values, factor=3.0):
+        return ITEMS["reject_outliers"].reference(values, factor)
+
+    assert all("it is 3.0 in yours, in the cell as it was given 4.0" in text for text in texts("reject_outliers", keep))
+    holds = ITEMS["time_offset"].properties[0]
+    for default, told in ((0.2, None), (0.1, "right, but where `max_offset` is left out it is 0.1 in yours")):
+        said = holds(lambda time, reference, delayed, max_offset=default: 0.0, None)
+        assert said is told if told is None else said.startswith(told)
+
+
+def test_a_factor_of_one_and_a_half_is_not_the_constant():
+    def keep(values, factor):
+        distance = np.abs(values - np.median(values))
+        return distance <= factor * 1.5 * np.median(distance)
+
+    texts("reject_outliers", keep)
+
+
 def test_six_equal_numbers_are_no_heights():
     assert "last row of a pose" in ITEMS["spread"].judge(0.0).text

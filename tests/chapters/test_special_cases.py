@@ -197,6 +197,14 @@ FAR_OR_SMALL = [
     ("measurement", lambda x, landmark: np.hypot(*(landmark - x[:2])) > 10),
     ("measurement_jacobian", lambda x, landmark: np.hypot(*(landmark - x[:2])) < 1),
     ("recover", lambda w_mean, w_slow, *_: w_slow < 0.1),
+    ("numeric_jacobian", lambda function, x, step: (x == 0).any()),
+    ("analytic_jacobian", lambda T_FS, T_BF, x_S: np.abs(x_S).max() < 1),
+    ("gauss_newton_on_pose", lambda T, T_BF, x_S, target: not (frames.transform(T_BF @ T, x_S) - target).any()),
+    ("joint_residual", lambda u, *_: np.linalg.norm(u[:3]) > np.pi),
+    ("dh_matrix", lambda theta, d, a, alpha: abs(alpha) > np.pi),
+    ("moved_part", lambda T_BW, T_WE0, T_WE1, T_BP0: np.array_equal(T_WE0[:3, 3], T_WE1[:3, 3])),
+    ("point_covariance", lambda T, cov_T, p, cov_p: cov_T.any() and not np.diag(cov_T).all()),
+    ("shares", lambda jacobians, covariances: not all(np.diag(C).all() for C in covariances)),
 ]
 
 

@@ -404,6 +404,13 @@ def trolley_at_rest(rng):
     return T_BW, T_WE, T_WE.copy(), T_BP
 
 
+def trolley_turned(rng):
+    """The same where the tracker is turned and has not moved."""
+    T_BW, T_WE0, T_WE1, T_BP = trolley(rng)
+    T_WE1[:3, 3] = T_WE0[:3, 3]
+    return T_BW, T_WE0, T_WE1, T_BP
+
+
 def trolley_far_off(rng):
     """The same tens of meters off."""
     poses = trolley(rng)
@@ -421,6 +428,15 @@ def uncertain_point(rng):
     turn, point = rng.normal(size=(6, 6)), rng.normal(size=(3, 3)) * rng.uniform(0.1, 0.4)
     turn = np.repeat([2e-3, 0.2], 3)[:, None] * turn * rng.uniform(0.5, 2)
     return T, turn @ turn.T, p, point @ point.T
+
+
+def certain_along_some(rng):
+    """The same with no error about one axis of the pose and along one of the point: neither covariance has an inverse."""
+    T, cov_T, p, cov_p = uncertain_point(rng)
+    for cov in (cov_T, cov_p):
+        k = rng.integers(len(cov))
+        cov[k] = cov[:, k] = 0
+    return T, cov_T, p, cov_p
 
 
 def _carried(
@@ -474,6 +490,15 @@ def small_sources(rng):
     """Sources of which each contributes micrometers at most."""
     jacobians, covariances = sources_of_error(rng)
     return jacobians, [1e-8 * cov for cov in covariances]
+
+
+def certain_sources(rng):
+    """Sources of which one parameter each is known exactly: no covariance has an inverse."""
+    jacobians, covariances = sources_of_error(rng)
+    for cov in covariances:
+        k = rng.integers(len(cov))
+        cov[k] = cov[:, k] = 0
+    return jacobians, covariances
 
 
 def shares(jacobians, covariances):
@@ -867,6 +892,7 @@ CELL = [
         metric=metrics.Poses(1e-6, 1e-6),
         noisy=(
             (trolley_at_rest, metrics.Poses(1e-6, 1e-6), "right, but not where the trolley has not moved:"),
+            (trolley_turned, metrics.Poses(1e-6, 1e-6), "right, but not where the tracker turns on the spot:"),
             (trolley_far_off, metrics.Poses(1e-6, 1e-4), "right, but not tens of meters off:"),
         ),
         fixed=dict.fromkeys(("T_BW", "T_WE0", "T_WE1", "T_BP0"), "a pose is 4 x 4"),
@@ -995,6 +1021,13 @@ CELL = [
                 ((1, 1e-6, 1, 1e-6), "right, but not for small covariances, of micrometers:"),
                 ((1, 1e3, 40, 1e3), "right, but not for a point meters away and large covariances:"),
             )
+        )
+        + (
+            (
+                certain_along_some,
+                metrics.Numbers(1e-6, "mm^2"),
+                "right, but not where there is no error along some axis, its variance 0:",
+            ),
         ),
         fixed={
             "T_AB": "a pose is 4 x 4",
@@ -1087,6 +1120,11 @@ CELL = [
                 small_sources,
                 metrics.Numbers(1e-6, "mm", least=0),
                 "right, but not for sources that contribute micrometers:",
+            ),
+            (
+                certain_sources,
+                metrics.Numbers(1e-9, "mm"),
+                "right, but not where a parameter of each source is known exactly, its variance 0:",
             ),
         ),
         hints=(

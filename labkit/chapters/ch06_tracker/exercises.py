@@ -12,6 +12,7 @@ from ...exercises import metrics
 from ...exercises.draws import scaled
 from ...exercises.engine import Chapter, Exercise, Prediction
 from ...exercises.outcome import Mistake
+from ...exercises.special import default_is
 from ...exercises.value import Value
 from ...geometry import lie
 from ...geometry.frames import invert, pose, relative, unit_vector
@@ -330,6 +331,13 @@ def motions_of_size(rng, factor):
     return A, B, R
 
 
+def one_motion_astray(rng):
+    """Motions of flange and tracker, one of which the tracker missed by centimeters."""
+    A, B, R = translation_problem(rng)
+    B[rng.integers(len(B)), :3, 3] += rng.choice([-1, 1], 3) * rng.uniform(30, 60, 3)
+    return A, B, R
+
+
 def translation_lsq(A, B, R):
     """Translation of the mounting by least squares, shape (3,), mm."""
     return ax_xb.translation_from_motions(A, B, R)[0]
@@ -377,16 +385,19 @@ def _far(rng):
     return rng.choice([-1, 1]) * rng.uniform(40, 90)
 
 
-def spoiled(rng, factor, size=1.0):
+def spoiled(rng, factor, size=1.0, nearest=()):
     """Values about some number, and more on both sides at certain shares of the limit: every other rule draws its line between
-    two of them, the rule itself where none is near.
+    two of them, the rule itself where none is near, or hardly one but the `nearest`.
     """
-    n = 2 * int(rng.integers(55, 66)) + 1
-    core = np.r_[np.linspace(-1, 1, n), np.zeros(4)] + 0.01 * rng.normal(size=n + 4)
-    tail = np.r_[SHARES, SHARES[9:], -SHARES[:9]]
-    limit = factor * 1.4826 * _mad(np.r_[core, 99 * np.sign(tail)])
-    values = np.r_[core, np.median(np.r_[core, 99 * np.sign(tail)]) + limit * tail]
-    return rng.permutation(_far(rng) + size * rng.uniform(0.5, 2) * values), factor
+    while True:
+        n = 2 * int(rng.integers(55, 66)) + 1
+        core = np.r_[np.linspace(-1, 1, n), np.zeros(4)] + 0.01 * rng.normal(size=n + 4)
+        tail = np.r_[SHARES, SHARES[9:], -SHARES[:9], nearest]
+        limit = factor * 1.4826 * _mad(np.r_[core, 99 * np.sign(tail)])
+        values = np.r_[core, np.median(np.r_[core, 99 * np.sign(tail)]) + limit * tail]
+        shares = np.abs(values - np.median(values)) / (factor * 1.4826 * _mad(values))
+        if np.abs(shares - 1).min() > 0.005:  # 1.48 for 1.4826 is good enough
+            return rng.permutation(_far(rng) + size * rng.uniform(0.5, 2) * values), factor
 
 
 def lopsided(rng):
@@ -832,7 +843,10 @@ CHAPTER = Chapter(
                         f"right, but not for a link {this}:",
                     )
                     for factors, this in (
-                        ((2, 10, 10, 1), "of half a meter and more that is turned by more than half a turn"),
+                        (
+                            (2, 10, 10, 2),
+                            "of half a meter and more that is turned by more than half a turn, about both axes",
+                        ),
                         (
                             (1e-3, 1e-2, 1e-2, 1e-3),
                             "that is short, by millimeters, and hardly turned, by thousandths of a radian",
@@ -1304,6 +1318,11 @@ CHAPTER = Chapter(
                     metrics.Numbers(1e-6, "mm"),
                     "right, but not for two motions alone:",
                 ),
+                (
+                    one_motion_astray,
+                    metrics.Numbers(1e-7, "mm"),
+                    "right, but not where one motion is far off. Least squares hear it like all others:",
+                ),
                 *(
                     (functools.partial(motions_of_size, factor=factor), metrics.Numbers(1e-8, "mm"), words)
                     for factor, words in (
@@ -1607,6 +1626,11 @@ CHAPTER = Chapter(
                     "lies at the median itself is within a limit of 0 (or all may stay):",
                 ),
                 (
+                    functools.partial(spoiled, factor=4.0, nearest=(1.006, -0.994)),
+                    KeptOrNot(),
+                    "Right where no value is near the limit. Where some lie within a percent of it (is it 1.4826, to three digits?):",
+                ),
+                (
                     functools.partial(spoiled, factor=4.0, size=1e-4),
                     KeptOrNot(),
                     "Right where the values scatter by about 1. Where they scatter by a ten thousandth of that:",
@@ -1623,6 +1647,7 @@ CHAPTER = Chapter(
                 ),
                 (one_value, KeptOrNot(), "Right for many values. For one alone, which is its own median:"),
             ),
+            properties=(default_is("factor", 4.0),),
             hints=(
                 "Measure how far each value is from the middle, in units of a spread. Outliers must move neither of the two.",
                 "Middle: the median. Spread: 1.4826 times the median of the distances from it; for normal noise that is a standard deviation.",
@@ -1943,6 +1968,7 @@ CHAPTER = Chapter(
                     "Right on clean curves. On noisy ones that are shifted by up to a third of their length, where the shifts differ in how many samples overlap:",
                 ),
             ),
+            properties=(default_is("max_offset", 0.2),),
             hints=(
                 "Shift one curve against the other, sample by sample, and find where they differ least. Then look between the samples.",
                 "Cost of a shift s: mean of (delayed[k + s] - reference[k])^2 over the common part. A parabola through the best three has its vertex at the offset.",
