@@ -377,14 +377,15 @@ def dogleg_step(g, B, radius):
 #
 # - The step is *taken* where $\rho > 0.1$; otherwise $x$ stays.
 # - The *radius* becomes a quarter of the step's length where $\rho < \tfrac14$. It doubles where $\rho > \tfrac34$ and the step is longer than 0.999 of it. Otherwise it stays.
+#
+# The check has up to four unknowns, so whatever you call from the loop, your `dogleg_step` for instance, must take more than two.
 
 # %% trust_region
 @ex.trust_region
 def trust_region(residual, jacobian, x, radius, steps):
     """Return x, shape (n,), and the radius, a number, after so many rounds (steps).
 
-    residual(x): (m,); jacobian(x): (m, n); x, radius: those of the start. n may be more
-    than 2: whatever you call here, dogleg_step say, must take that many unknowns."""
+    residual(x): (m,); jacobian(x): (m, n); x, radius: those of the start."""
     ### BEGIN SOLUTION
     for _ in range(steps):
         r, J = residual(x), jacobian(x)
