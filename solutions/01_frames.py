@@ -139,9 +139,9 @@ def invert(T):
 # workbook's `frames.invert` says what is wrong. Mind the first line: 0.00 means a perfect inverse, of a matrix that is no pose.
 
 # %% pseudo-inverse-hides
-typo = frame_from_points(*measured["K1"])
+typo = np.array(frame_from_points(*measured["K1"]))
 typo[0, 1] = -0.909950
-flat = frame_from_points(*measured["K1"])
+flat = np.array(frame_from_points(*measured["K1"]))
 flat[:3, 2] = 0
 for name, T in (("mistyped", typo), ("axis missing", flat)):
     back = np.linalg.pinv(T) @ T
@@ -173,8 +173,8 @@ def relative(T_WA, T_WB):
 # Listing 4 prints $T_{K_0K_1}$ with six digits after the point. Compare yours with it, entry by entry.
 
 # %% compare-listing-4
-T_K0K1 = relative(frame_from_points(*measured["K0"]),
-                  frame_from_points(*measured["K1"]))
+T_WK0, T_WK1 = np.array([frame_from_points(*measured[k]) for k in ("K0", "K1")])
+T_K0K1 = np.array(relative(T_WK0, T_WK1))
 listing_4 = np.array([[0.010000, -0.999950, 0, 0.99], [0.999950, 0.010000, 0, -1],
                       [0, 0, 1, 0], [0, 0, 0, 1]])
 print(T_K0K1 + 0.0)

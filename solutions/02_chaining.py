@@ -105,7 +105,7 @@ def chain(transforms):
 # a bound for every entry. In the last column the digits of the *rotations* arrive multiplied by a lever of some hundred millimeters.
 
 # %% compare-listing-7
-product = chain(printed)
+product = np.array(chain(printed))
 listing_7 = lab_sheet.printed_product()
 bound = chaining.rounding_bound(printed, lab_sheet.HALF_DIGIT)
 off = np.abs(product - listing_7)
@@ -291,7 +291,7 @@ def distribute_closure(transforms):
 
 # %% closed
 links = np.array([orthonormalize(T) for T in printed])
-corrected = distribute_closure(links)
+corrected = np.array(distribute_closure(links))
 gaps = [chaining.closure_error(chain(loop))[1] for loop in (links, corrected)]
 much = gaps[0] > 1e6 * gaps[1]
 print(f"closed: {gaps[1] < 1e-9}, by a factor of more than a million: {much}")

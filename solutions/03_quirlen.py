@@ -93,8 +93,8 @@ def solve_pivot(A, b):
 
 
 # %% compare-listing-9
-A, b = pivot_matrix(poses), pivot_rhs(poses)
-x = solve_pivot(A, b)
+A, b = np.array(pivot_matrix(poses)), np.array(pivot_rhs(poses))
+x = np.array(solve_pivot(A, b))
 listing_9 = np.array([-1.747805, 44.586360, -87.648108, -253.032904, 107.040686,
                       -3.215224])
 print("tip  ", x[:3], "mm\npoint", x[3:], "mm")
@@ -128,7 +128,7 @@ def pivot_residuals(T_WF, tip, point):
 
 
 # %% s0
-residuals = pivot_residuals(poses, x[:3], x[3:])
+residuals = np.array(pivot_residuals(poses, x[:3], x[3:]))
 print("first P_test", residuals[0], "\nlast P_test ", residuals[-1])
 listings = np.array([[-0.106450, 0.191828, -0.098577],
                      [0.043934, -0.236217, -0.109208]])

@@ -1031,6 +1031,7 @@ def _turn(T):
 
 FORGOTTEN = [
     ("normalize", lambda v: np.linalg.norm(v) < 1e-6),
+    ("normalize", lambda v: np.linalg.norm(v) < 2.1e-8),
     ("normalize", lambda v: np.count_nonzero(v) == 2),
     ("gram_schmidt", lambda a, b: frames.arm_angle(a, b) < 0.1),
     ("gram_schmidt", lambda a, b: frames.arm_angle(a, b) < 0.01),

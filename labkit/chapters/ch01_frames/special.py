@@ -31,7 +31,7 @@ def vector(rng, length, signs=None):
 VECTORS = (
     *(
         (f"of a {words} vector", functools.partial(vector, length=length))
-        for words, length in (("short", 3.0), ("very long", 1e8))
+        for words, length in (("short", 3.0), ("tiny", 2e-8), ("very long", 1e8))  # tiny: no 0 for np.isclose
     ),
     *(
         (f"where {words}", functools.partial(vector, length=70.0, signs=signs))

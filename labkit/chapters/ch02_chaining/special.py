@@ -103,7 +103,7 @@ BLOCKS = (
             ("a block three times as long as a rotation", (3, 3, 3)),
             ("a block off by some thousandths", (1.003, 0.998, 1.001)),
             ("a block off by 1e-8", (1 + 1e-8, 1, 1 - 2e-8)),
-            ("a block with right angles, too long by some millionths", (1 + 4e-6, 1 + 4e-6, 1 + 4e-6)),
+            ("a block with nearly right angles, too long by some millionths", (1 + 4e-6, 1 + 4.005e-6, 1 + 3.997e-6)),
             ("a block with a small singular value", (1.3, 0.9, 0.08)),
             ("a block with a large singular value", (12, 1.5, 0.9)),
         )
