@@ -61,6 +61,7 @@ OTHERS = {
     ast.Mod: (ast.FloorDiv,),
 }
 COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+STRICT = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt}  # and what is so but for one number
 ORDINALS = ("first", "second", "third")
 EQUALITIES = (ast.Eq, ast.NotEq)
 WITHOUT = {
@@ -1117,6 +1118,10 @@ def _comparison(node, names):
             other = (kind in EQUALITIES) != (here in EQUALITIES)  # of numbers: a case never met, or always
             ops = [*node.ops[:i], kind(), *node.ops[i + 1 :]]
             yield 2 if other else 0, words, ast.Compare(node.left, ops, node.comparators)
+    first = type(node.ops[0])
+    if len(node.ops) > 1 and first in STRICT and all(type(op) is first for op in node.ops):
+        words = f"with `{COMPARISONS[STRICT[first]]}` where each `{COMPARISONS[first]}` belongs"
+        yield 0, words, ast.Compare(node.left, [STRICT[first]()] * len(node.ops), node.comparators)
 
 
 def _conditions(node, names):

@@ -196,17 +196,20 @@ class Search:
         finite = any(result is None or np.isfinite(result).all() for result in wrong)
         return len(wrong) < len(self.cases) and not finite
 
-    def _is_cancelled(self, plan):
-        """Whether a value is changed where the result is right, and stays right: what was changed does not matter."""
+    def _does_not_matter(self, plan):
+        """Whether the draws on which the result is right, and stays right, tell that a change mends others by luck."""
+        changed, words = sum(self._cancelled(plan)), rerun.OTHERWISE[plan[2]][0]
+        return changed and (self.overflows or words not in rerun.CONSTANTS and changed > len(self.cases) / 2)
+
+    def _cancelled(self, plan):
+        """Of every draw on which the result is right, and stays right, whether the plan changes a value there."""
         kind, k, change, *other = plan
         for values, case in zip(self.values, self.cases):
             mine = case.args[k] if kind == "argument" else values[k][1][0] if values[k][0] else None
             others = [case.args[i] if kind == "value" else values[i][1][-1] for i in other if i is not None]
             if case.was_right and mine is not None:
                 mine, *others = (np.asarray(value, dtype=float) for value in (mine, *others))
-                if _changes(rerun.OTHERWISE[change][1], mine, others):
-                    return True
-        return False
+                yield _changes(rerun.OTHERWISE[change][1], mine, others)
 
     @_or_nothing
     def finer_words(self):
@@ -240,7 +243,7 @@ class Search:
 
     def _is_answer(self, plan):
         """Whether the function with this change would be taken as an answer, as far as fresh draws tell."""
-        if self.overflows and plan[0] in ("value", "own", "argument") and self._is_cancelled(plan):
+        if plan[0] in ("value", "own", "argument") and self._does_not_matter(plan):
             return False
         fresh = (self.written.results([plan], c.args, self.budget.left(), c.keep) for c in self.judging.more(plan[0]))
         if any(fit != [True] for fit in fresh):

@@ -859,7 +859,7 @@ def test_what_cancels_is_not_told_where_rounding_alone_is_wrong(monkeypatch):
     monkeypatch.setattr(steps.Search, "code_words", lambda self, ranks: None)
     body = "c = a * 1.0\nif c[0] > 1:\n    return b * np.nan\nreturn b * np.arccos(c[0] / np.hypot(*c))"
     assert steps.ALONE not in judged(FROM_X, body) and metrics.NOT_FINITE in judged(FROM_X, body)
-    monkeypatch.setattr(steps.Search, "overflows", False)
+    monkeypatch.setattr(steps.Search, "_does_not_matter", lambda self, plan: False)
     assert "`a`: half of it belongs there" in judged(FROM_X, body)
 
 
@@ -1368,3 +1368,19 @@ def test_a_variable_is_put_together_with_what_it_holds_by_then():
 def test_of_several_comparisons_in_a_row_it_is_said_which():
     changes = rerun.written(typed("return 0 < a < b")).changes
     assert any(mends == "the second `<` stands where `<=` belongs" for *_, mends in changes)
+
+
+def test_what_is_changed_where_the_result_is_right_and_stays_right_is_not_told(monkeypatch):
+    """Where both numbers are alike, each of them is taken twice; turned, one of them is the smallest."""
+    alike = (
+        lambda rng: (np.full(2, 1.5), rng.normal(size=2)),
+        metrics.Numbers(1e-9),
+        "right, but not where all are alike:",
+    )
+    item = replace(
+        ITEM, reference=lambda a, b: a @ b, draw=lambda rng: (rng.uniform(1, 2, 2), rng.normal(size=2)), noisy=alike
+    )
+    body = "i, k = np.argmin(a), np.argmax(a)\nreturn np.abs(a[i]) * b[i] + np.abs(a[k]) * b[k]"
+    assert judged(item, body).startswith("right, but not where all are alike:")
+    monkeypatch.setattr(steps.Search, "_does_not_matter", lambda self, plan: False)
+    assert "its entry 0" in judged(item, body)
