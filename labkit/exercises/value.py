@@ -116,10 +116,13 @@ class Value(Item):
         """
         exact = metrics.Numbers(1e-9)
         is_right = metric.equal(answer, expected)
+        near = metric.nearest(expected, answer)
         named = None if exact.equal(answer, expected) else self._mistake(answer, exact.equal)
+        if named is None and near is not expected and not is_right:
+            named = self._mistake(answer + (expected - near), exact.equal)
         if named:
             return named
-        digits = 0 if _is_whole(expected) else relations.significant_digits(answer, metric.nearest(expected, answer))
+        digits = 0 if _is_whole(expected) else relations.significant_digits(answer, near)
         if is_right or digits >= self.digits:
             return Outcome(CORRECT)
         named = self._mistake(

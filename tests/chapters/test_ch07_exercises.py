@@ -322,6 +322,7 @@ def test_a_rounded_pose_may_have_its_heading_wrapped():
     pose = item.reference() - [0.0, 0.0, 2 * np.pi]
     assert item.judge(np.round(pose, 4)).status == CORRECT
     assert item.judge(np.round(pose, 1)).status == NOT_YET
+    assert "midpoint" in item.judge(ch07._circle("midpoint")[0] - [0.0, 0.0, 2 * np.pi]).text
 
 
 def test_the_larger_part_of_the_noise_of_the_turn_rate_is_not_always_the_same():

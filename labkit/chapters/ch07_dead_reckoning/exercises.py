@@ -43,9 +43,9 @@ def several_circles(rng, n):
 
 
 def nearly_on_the_circles(rng):
-    """The same with distances that fit to within micrometers: residuals are small, and none of them is 0."""
-    landmarks, distances, position = several_circles(rng, 3)
-    return landmarks, np.linalg.norm(landmarks - position, axis=1) * (1 + 1e-8 * distances), position
+    """The same with distances that fit to within nanometers: residuals are small, and none of them is 0."""
+    landmarks, _, position = several_circles(rng, 3)
+    return landmarks, np.linalg.norm(landmarks - position, axis=1) * (1 + 2e-9), position
 
 
 def measured_twice(rng):
@@ -924,6 +924,15 @@ CHAPTER = Chapter(
                     metrics.Numbers(1e-8, "m"),
                     "right, but not from a start that is the position itself:",
                 ),
+                *(
+                    (
+                        functools.partial(at_places, robot=(0.25, 0.3), start=(0.25, 300.0), left=left),
+                        metrics.Numbers(1e-8, "m"),
+                        "right, but not from a start that is a kilometer away and more, from where fewer than twenty rounds "
+                        "may not arrive:",
+                    )
+                    for left in (True, False)
+                ),
                 (
                     from_a_millimeter_aside,
                     metrics.Numbers(1e-8, "m"),
@@ -1132,7 +1141,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a, b, l: np.array([(a + b) / 2, abs(b - a) / l]),
-                    "No absolute value: a turn to the right has omega < 0.",
+                    "Your turn rate is never negative, as with an absolute value or the wheels sorted. A turn to the right has omega < 0.",
                 ),
                 Mistake(
                     lambda a, b, l: np.array([(a + b) / 2, (b - a) / l if a + b else 0.0]),
@@ -2254,7 +2263,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda v, d, L: np.array([v, abs(v) * np.tan(d) / L]),
-                    "In reverse the car turns the other way: no absolute value of v.",
+                    "Your car turns to the side of its wheels in reverse as well. Backward it turns the other way: omega changes its sign with v.",
                 ),
                 Mistake(
                     lambda v, d, L: np.array([v, v * np.tan(np.radians(d)) / L]),
