@@ -306,7 +306,7 @@ for dt in (0.5, 0.1, 0.02):
     cut = lecture.circle_drive(dt)
     poses, covs = odometry.drive_with_covariance(np.zeros(3), np.zeros((3, 3)),
                                                  cut.controls, dt, **cut.noise)
-    fixed = np.array(control_covariance(cut.controls[0], 0.1, **cut.noise))
+    fixed = control_covariance(cut.controls[0], 0.1, **cut.noise)
     wrong = np.sqrt(len(cut.controls) * dt**2 * fixed[1, 1])
     position = np.sqrt(np.trace(covs[-1][:2, :2]))
     heading = np.degrees(np.sqrt(covs[-1][2, 2]))

@@ -282,9 +282,8 @@ def motion_jacobians(x, u, dt):
 # %% numeric-check-code
 def slopes(function, x, h=1e-6):
     """Central differences of function(x) by x, one column per coordinate."""
-    return np.column_stack([
-        np.subtract(function(x + h * e), function(x - h * e)) / (2 * h)
-        for e in np.eye(len(x))])
+    return np.column_stack([(function(x + h * e) - function(x - h * e)) / (2 * h)
+                            for e in np.eye(len(x))])
 
 
 x, u, landmark = np.array([0.5, -1.0, 2.0]), np.array([1.0, 0.4]), np.array([3.0, 2.0])

@@ -75,7 +75,7 @@ def motions(T_BF, T_ST):
 # outliers show at once.
 
 # %% screws-code
-A, B = np.array(motions(robot.T, sensor.T))
+A, B = motions(robot.T, sensor.T)
 (angle_A, shift_A), (angle_B, shift_B) = motion.screw(A), motion.screw(B)
 angles, shifts = np.rad2deg(angle_A - angle_B), shift_A - shift_B
 for i in range(0, len(angles), 3):
@@ -112,9 +112,9 @@ def between_axes(T, apart):
 # %% swapped-code
 swapped = [read_poses(f).in_unit("mm") for f in sample_cell("swapped_role")]
 for words, T_ST in (("as it stands", swapped[1].T), ("inverted", invert(swapped[1].T))):
-    A, B = np.array(motions(swapped[0].T, T_ST))
+    A, B = motions(swapped[0].T, T_ST)
     for apart in (1, 2):
-        off = np.rad2deg(np.subtract(between_axes(A, apart), between_axes(B, apart)))
+        off = np.rad2deg(between_axes(A, apart) - between_axes(B, apart))
         rms = np.sqrt(np.mean(off**2))
         print(f"{words:12} axes {apart} apart differ by {rms:4.1f} deg (rms)")
 try:

@@ -24,9 +24,10 @@ class Evidence:
         self.exercise, self.function, self.defaults = exercise, function, Defaults(function)
         self.pairs, self.inputs, self.metrics, self.words = [], [], [], []
         self.refusal, self.printed, self.spent, self.budget = "", "", 0.0, Budget(budget.LOOKING)
+        self.listed = False
 
     def outcome(self, status, text="", mistake=None):
-        return Outcome(status, text, mistake, self.printed)
+        return Outcome(status, text, mistake, self.printed, self.listed)
 
     def _cases(self):
         """(arguments, metric, pair) of the draws that tell: the plain ones, or all where only special ones are off."""

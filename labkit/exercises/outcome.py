@@ -2,7 +2,7 @@
 
 import hashlib
 import types
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from . import guard
 from .typeset import typeset
@@ -12,12 +12,15 @@ TO_DO, NOT_YET, CORRECT, RAISED = "to do", "not yet", "correct", "your code rais
 
 @dataclass(frozen=True)
 class Outcome:
-    """The judgment of one answer: status, what to say about it, and the index of the named mistake it is, if any."""
+    """The judgment of one answer: status, what to say about it, and the index of the named mistake it is, if any; which
+    of its results are lists where arrays are meant.
+    """
 
     status: str
     text: str = ""
     mistake: int | None = None
     printed: str = ""
+    listed: bool | tuple = field(default=False, compare=False)
 
     def __post_init__(self):
         object.__setattr__(self, "text", guard.printable(typeset(self.text)))

@@ -17,6 +17,7 @@ from ..places import ROOT
 from . import feedback, guard, kept, progress, source
 from .engine import Prediction
 from .feedback import Named, Panel
+from .listed import in_arrays
 from .outcome import CORRECT, NOT_YET, RAISED, TO_DO, is_blank
 from .value import Value
 
@@ -136,7 +137,7 @@ class Bound:
             progress.record(self._chapter.name, self._item.id, outcome.status, **named)
         feedback.show(self._panel(outcome, guard.PRISTINE.drain()))
         if outcome.status == CORRECT:
-            return Answer.of(answer) if is_value else answer
+            return Answer.of(answer) if is_value else in_arrays(answer, outcome.listed)
         if is_strict():
             raise NotCorrect(f"{self._item.id}: {outcome.status}. {outcome.text}")
         feedback.show(feedback.button_row(self._next_hint, self._solution, self._start_over))

@@ -5,6 +5,7 @@ import copy
 from . import guard, metrics, scope
 from .budget import seconds
 from .explanations import NOT_RIGHT
+from .listed import listed_in
 from .outcome import CORRECT, NOT_YET
 from .raised import Raised
 from .results import Refusal
@@ -25,6 +26,7 @@ class Trial(Raised, Staying):
         def finish(result):
             try:
                 admitted.append(metric.admit(result, expected) if metric else result)
+                self.listed = self.listed or listed_in(result, expected)
             except metrics.Refused as refusal:
                 self.refusal = self.refusal or f"{self._led(words)}{refusal}"
                 admitted.append(Refusal(result))
