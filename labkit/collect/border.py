@@ -244,10 +244,8 @@ class Written:
         self.changes = [(int(rank), int(line), str(code), str(mends)) for rank, line, code, mends in changes]
         self.places = [(int(n), str(code), str(name), int(size), int(k)) for n, code, name, size, k in places]
         self.lines = {int(n): str(line) for n, line in facts["lines"].items()}
-        self.of_notebook, self.repeats = set(map(str, facts["of_notebook"])), bool(facts["repeats"])
-        self.iterated, self.searched, self.walked = (
-            set(map(int, facts[n])) for n in ("iterated", "searched", "walked")
-        )
+        self.of_notebook = set(map(str, facts["of_notebook"]))
+        self.iterated, self.searched = (set(map(int, facts[n])) for n in ("iterated", "searched"))
 
     def trace(self, args, seconds):
         """As `rerun.Written.trace`."""
