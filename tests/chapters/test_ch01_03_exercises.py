@@ -1170,6 +1170,25 @@ def test_a_guard_against_next_to_nothing_is_right(name, answer, seed):
     assert ch01_exercises.CHAPTER[name].judge(answer, rng=np.random.default_rng(seed)).status == CORRECT
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_quotient_for_c_is_not_told_to_be_an_arcsine(seed, monkeypatch):
+    """Both are right where C is within 90 deg, so it is beyond at every check, as A is in another draw."""
+    monkeypatch.setattr(budget, "LOOKING", 0.0)
+    item, rng = ch01_exercises.CHAPTER["kuka_from_matrix"], np.random.default_rng(seed)
+    angles = np.array([frames.kuka_from_matrix(*draw(rng))[[3, 5]] for draw in item.cases])
+    A, C = (np.abs(angles) > np.pi / 2).T
+    assert (A & ~C).any() and (C & ~A).any() and (A & C).any()
+    quotient = next(mistake for mistake in item.mistakes if mistake.id == "kuka-quotient-C")
+    assert item.judge(lambda T: quotient.variant(T), rng=np.random.default_rng(seed)).text == quotient.text
+
+
+@pytest.mark.parametrize(
+    "answer, told", [(0.01, "cosine of the angle"), (0.573, "too small"), (89.44, "too large"), (89.43, "")]
+)
+def test_a_rounded_angle_is_nothing_made_of_two_numbers(answer, told):
+    assert told in ch01_exercises.CHAPTER["angle_deg"].judge(answer).text
+
+
 def made_axes(a, b, nothing=0.0):
     x = a / (np.linalg.norm(a) + nothing)
     y = b - (b @ x) * x

@@ -997,7 +997,6 @@ CHAPTER = Chapter(
             of={
                 "the angle": lambda: frames.rotation_angle(_K0_T_K1()),
                 "T_K0K1[:3, 3]": lambda: _K0_T_K1()[:3, 3],
-                "the cosine": lambda: _K0_T_K1()[0, 0],
             },
             hints=(
                 "The trace of a rotation matrix knows its angle.",
@@ -1039,6 +1038,11 @@ CHAPTER = Chapter(
                     lambda: np.deg2rad(frames.rotation_angle(_K0_T_K1())),
                     "This is the angle in radians, converted to radians once more: np.rad2deg makes degrees.",
                     id="angle-deg2rad",
+                ),
+                Mistake(
+                    lambda: _K0_T_K1()[0, 0],
+                    "This is the cosine of the angle. Its arccosine, in degrees, is asked for.",
+                    id="angle-cosine",
                 ),
                 Mistake(
                     lambda: np.rad2deg(np.arctan(_K0_T_K1()[0, 0])),
