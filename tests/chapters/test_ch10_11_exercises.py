@@ -11,7 +11,7 @@ from labkit.chapters.ch10_ledger import exercises as ledger
 from labkit.chapters.ch10_ledger import proofs
 from labkit.chapters.ch11_your_own_data import exercises as own
 from labkit.documents.ledger import Computed, Row, judge
-from labkit.documents.rounding import half_unit, read
+from labkit.documents.rounding import half_unit, number, read
 from labkit.documents.slips import single_slips
 from labkit.exercises import budget
 from labkit.exercises.metrics import Refused
@@ -374,6 +374,19 @@ ALMOST_RIGHT = [
     ("with_one_more", lambda C, J: own.with_one_more(C[:9, :9], J[:, :9])),
     ("next_pose", lambda C, c: own.next_pose(C, c[:20])),
     ("next_pose", lambda C, c: int(np.argmin(np.round(own._volumes(C, c), 16)))),
+    (
+        "half_unit",
+        lambda p: _of_the_mantissa(p) * 10.0 ** np.floor(np.log10(abs(number(p)))) if "e" in p else half_unit(p),
+    ),
+    ("half_unit", lambda p: 0.0 if p == "0" else half_unit(p)),
+    ("half_unit", lambda p: max(half_unit(p), 0.5e-9) if "e" not in p else half_unit(p)),
+    *(
+        ("suspects", proofs._search(slips=proofs._without(kind)))
+        for kind in ("one digit missing", "one digit too many", "decimal point moved")
+    ),
+    ("bound", lambda f, p: _up_or_down(f, p, at=lambda texts: [*enumerate(texts)][:8])),
+    ("status", lambda *a: _status(*a, half=lambda text: half_unit(text) + 1e-7)),
+    ("status", lambda p, v, b, m, s: _status(p, v, b, m and abs(v - number(p)) > 3 * half_unit(p) * b, s)),
 ]
 
 

@@ -26,7 +26,10 @@ FORMS = (
     "d,de-k",
     "d,dek",
     "-d.de-1k",
-    "0.0000000dd",
+    "dd.de-k",
+    "-0,0ddek",
+    "0.0000000000dd",
+    "0",
     "0.0d0",
     "0,dd",
     "de1k",
@@ -59,8 +62,9 @@ def special_comparison(rng, kind, simulated, beyond):
     "sign": the value has the other sign. "edge": it is off by half a unit to the last bit, from an odd number. "limit":
     by half a unit and the bound. "small" and "far": printed with an exponent below 0, and within the half unit or far
     away; "large": with one above 0, within the half unit. "finest" and "fine": six decimals, and the value is off by less
-    than half a unit of the last, or by nearly one. "wide": off by hundreds, within the bound. "whole": a whole number, of which the last digits are 0.
-    "zero": 0 is printed. "digits": eight digits, and the value is off by more than half a unit and the bound.
+    than half a unit of the last, or by a little more. "wide": off by hundreds, within the bound. "whole": a whole number, of which the last digits are 0.
+    "beyond": it is off by a little more than half a unit and the bound, and a misprint where it is the larger. "zero": 0 is
+    printed. "digits": eight digits, and the value is off by more than half a unit and the bound.
     """
     misprint, bound = bool(rng.integers(2)), float(rng.integers(1 if kind == "limit" else 0, 4))
     whole = int(rng.integers(2, 90)) * int(rng.choice([-1, 1]))
@@ -71,13 +75,15 @@ def special_comparison(rng, kind, simulated, beyond):
         return str(whole | 1), (whole | 1) + 0.5 * side, bound, misprint, simulated
     if kind == "limit":
         return str(whole), whole + side * (0.5 + bound), bound, misprint, simulated
+    if kind == "beyond":
+        return str(whole), whole + side * (3.5 + rng.uniform(0.2, 0.8)), 3.0, beyond, simulated
     if kind == "whole":
         return f"{whole}00", float(100 * whole + side * rng.uniform(5, 40)), bound, misprint, simulated
     if kind == "zero":
         return "0.0", float(side * rng.uniform(0.01, 0.04)), bound, misprint, simulated
     if kind in ("finest", "fine"):
         printed = f"{whole}{rng.integers(10, 100)}.{rng.integers(10, 100)}{rng.integers(100, 1000)}{rng.integers(3, 7)}"
-        return printed, float(printed) + side * (0.3e-6 if kind == "finest" else 0.9e-6), 0.0, misprint, simulated
+        return printed, float(printed) + side * (0.3e-6 if kind == "finest" else 0.55e-6), 0.0, misprint, simulated
     if kind == "wide":
         return f"{whole}00", float(100 * whole + side * rng.uniform(200, 400)), 500.0, misprint, simulated
     if kind == "digits":
@@ -99,6 +105,7 @@ SPECIAL = tuple(
         ("sign", "the value has the other sign than the printed number"),
         ("edge", "the value is off by half a unit exactly: that is still within"),
         ("limit", "the value is off by half unit and bound exactly: that is still within"),
+        ("beyond", "a whole number is printed, and the value is off by a little more than half unit and bound"),
         *((kind, "the number is printed with an exponent, as 3e-4 or 3e4") for kind in ("small", "far", "large")),
         ("zero", "0 is printed"),
         ("whole", "the number is whole and ends with zeros: they are digits like all others"),

@@ -72,13 +72,13 @@ INPUTS = tuple(functools.partial(printed_inputs, function=f) for f in FUNCTIONS)
 
 
 def special_inputs(rng, kind):
-    """A function and printed numbers: "whole", with an "exponent", one printed "twice", "one" alone, "six", or with a
+    """A function and printed numbers: "whole", with an "exponent", one printed "twice", "one" alone, "nine", or with a
     "zero" among them, or zeros "only"; "fine" and "large": all of six decimals and near 0, or in the ten thousands;
     "negative": all below 0.
     """
     if kind == "only":
         return total, ["0", "0.0", "-0,00"][: rng.integers(2, 4)]
-    texts = [str(rng.integers(2, 30)) for _ in range({"one": 1, "six": 6}.get(kind, 3))]
+    texts = [str(rng.integers(2, 30)) for _ in range({"one": 1, "nine": 9}.get(kind, 3))]
     if kind == "exponent":
         texts[0] = f"{rng.uniform(2, 9):.{rng.integers(1, 3)}f}e{rng.choice([-2, -1])}"
         texts[1] = f"{rng.uniform(2, 9):.{rng.integers(1, 3)}f}e{rng.choice([3, 4])}".replace(".", ",")
@@ -93,7 +93,7 @@ def special_inputs(rng, kind):
     elif kind == "twice":
         texts = [f"{rng.uniform(2, 9):.{rng.integers(1, 3)}f}" for _ in range(2)]
         texts.insert(int(rng.integers(0, 3)), texts[0])
-    return {"one": length, "six": length, "large": length, "fine": total, "negative": growth}.get(
+    return {"one": length, "nine": length, "large": length, "fine": total, "negative": growth}.get(
         kind, last_power
     ), texts
 
@@ -212,7 +212,7 @@ BOUND = Exercise(
             ("exponent", "a number is printed with an exponent, as 3e-4"),
             ("twice", "one and the same number is printed twice"),
             ("one", "f takes one number alone"),
-            ("six", "f takes more than four numbers"),
+            ("nine", "f takes more than four numbers"),
             ("zero", "a number is printed as 0: that may be anything within its half unit too"),
             ("negative", "all numbers are below 0"),
             ("fine", "all numbers are near 0, with six decimals: half units of half a millionth move f as well"),
@@ -489,6 +489,23 @@ def _slipped(rng, text, kind):
     return str(rng.choice(far)) if far else f"{-number(text):.{len(text.partition('.')[2])}f}"
 
 
+LEFT_OUT = {
+    "one digit too many": "one digit missing",
+    "decimal point moved": "decimal point moved",
+}  # and what makes it
+
+
+def of_one_kind(rng, kind):
+    """A column in which somebody is suspected for a slip of this kind alone."""
+    while True:
+        values = np.round(rng.uniform(2, 60, 4), int(rng.integers(1, 3)))
+        entries, k = [str(value) for value in values], int(rng.integers(4))
+        average = f"{values.mean():.4f}"
+        entries[k] = _slipped(rng, entries[k], LEFT_OUT[kind])
+        if _search(slips=_without(kind))(entries, average) != suspects(entries, average):
+            return entries, average
+
+
 def _clear(rng, draw):
     """A column of which no gap, as it is or after a slip, lies at what is allowed to the last bits, be it by all, by
     the entries alone or by the average alone.
@@ -610,6 +627,7 @@ COLUMNS = tuple(
         *(functools.partial(explained_by_both, counted=counted) for counted in ((1, 0), (0, 1))),
         functools.partial(at_the_limit, finer=2, low=BEYOND[0], high=BEYOND[1]),
         *(functools.partial(other_columns, kind=kind) for kind in ("beside", "like")),
+        *(functools.partial(of_one_kind, kind=kind) for kind in LEFT_OUT),
     )
 )
 
@@ -1143,6 +1161,14 @@ SUSPECTS = Exercise(
         Mistake(
             _search(slips=_without("sign lost")),
             "You leave out lost signs. `single_slips` lists all slips there are: take them as they come.",
+        ),
+        *(
+            Mistake(
+                _search(slips=_without(kind)),
+                f"You leave out one kind of slip, *{kind}*. `single_slips` lists all slips there are: take them as "
+                "they come.",
+            )
+            for kind in LEFT_OUT
         ),
         Mistake(
             _search(agree=_without_signs_agrees),
