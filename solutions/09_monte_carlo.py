@@ -176,8 +176,8 @@ def cast_ray(grid, pose, bearing, r_max):
     """Return the distance (m) to the first occupied cell along a beam, r_max if there
     is none.
 
-    grid.at([x, y]) is maps.OCCUPIED there; maps.FREE and maps.UNKNOWN do not stop it. A
-    cell is grid.resolution wide (m).
+    grid.at([x, y]) is maps.OCCUPIED there; maps.FREE and maps.UNKNOWN, as all is beyond
+    the map, do not stop it. A cell is grid.resolution wide (m).
     """
     ### BEGIN SOLUTION
     angle = pose[2] + bearing

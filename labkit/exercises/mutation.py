@@ -816,7 +816,7 @@ def _shorter_steps(function):
             yield from _with_a_part(owner, "args", owner.args[2])
         elif isinstance(owner, ast.Call) and getattr(owner.func, "attr", "") == "linspace" and len(owner.args) == 3:
             places = getattr(owner.args[2], "value", None)
-            for more in (10 * places, 30 * places) if type(places) is int else ():
+            for more in (10 * places, 30 * places, 100 * places) if type(places) is int else ():
                 new = ast.copy_location(ast.Constant(more), owner.args[2])
                 mends = f"{places} places are far too few: {more} will do"
                 yield Change("", mends, FINER, owner, ((owner, "args", [*owner.args[:2], new]),))

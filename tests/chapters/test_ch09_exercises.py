@@ -13,7 +13,7 @@ from labkit.exercises import budget, session
 from labkit.exercises.outcome import CORRECT, NOT_YET, RAISED
 from labkit.geometry import planar
 from labkit.localization import maps, mcl, odometry, particles
-from tests.chapters.draws_of_a_check import SEEDS
+from tests.chapters.draws_of_a_check import SEEDS, is_missed, one_check
 
 CHAPTER = next(chapter for chapter in session.chapters() if chapter.name == "09-monte-carlo")
 
@@ -343,13 +343,16 @@ def test_a_test_that_is_too_strict_is_told_which_correct_function_it_rejects():
 def test_chance_refuses_a_right_roulette_less_than_once_in_a_million_checks():
     """By the laws: binomial shares, the variance of a variance of binomial counts (its excess kurtosis is -0.2)."""
     shares = 0.0
-    for weights in (*ch09.WEIGHTS, *[ch09.WEIGHTS[1]] * len(ch09.SCALES)):
+    for weights in (*ch09.WEIGHTS, *[ch09.WEIGHTS[1]] * len(ch09.SCALES), np.array([1, 7, 1, 1])):
         n = 2000 // len(weights) * len(weights)
         for p in weights / weights.sum():
             low, high = np.ceil(n * (p - ch09.SHARE_OFF)) - 1, np.floor(n * (p + ch09.SHARE_OFF))
             shares += binom.cdf(low, n, p) + binom.sf(high, n, p)
     std = 2.5 * np.sqrt(2 / 599 - 0.2 / 600)
     half = norm.cdf((ch09.HALF_VARIES - 2.5) / std)
+    counts = binom(10, 0.1)
+    std = counts.var() * np.sqrt((2 / 599 + counts.stats("k") / 600) / 9)  # of the ten, nine are free
+    half += 2 * norm.sf(ch09.VARIES / std)
     n = len(ch09.MANY) * ch09.TURNS
     many = [binom.cdf(ch09.FEWEST - 1, n, p) + binom.sf(ch09.MOST, n, p) for p in ch09.MANY / ch09.MANY.sum()]
     apart = chi2.sf(ch09.APART, len(ch09.MANY) - 1)
@@ -842,6 +845,7 @@ def test_random_numbers_that_change_nothing_are_no_missing_ones():
 
 def test_shares_that_belong_to_other_indices_are_told_as_these():
     right = ch09.WEIGHTS[0]
+    assert ch09._shifted(np.array([0.5, 0.25, 0.09, 0.16]), np.array([0.5, 0.25, 0.15, 0.1])) == "", "no other index's"
     assert "sorted" in ch09._shifted(np.sort(right)[::-1], right)
     assert ch09._shifted(np.full(5, 0.2), right) == ""
 
@@ -849,3 +853,98 @@ def test_shares_that_belong_to_other_indices_are_told_as_these():
 def test_slow_answers_find_the_distances_of_their_map_computed():
     draws = (ch09.scan_at_a_pose, ch09.scan_on_another_map, ch09.scan_in_a_wide_hall)
     assert all("distance" in vars(draw(np.random.default_rng(0))[0]) for draw in draws)
+
+
+def alike_once(pose, z, landmarks, *stds):
+    """Two readings of one landmark count as the last of them."""
+    last = list({tuple(mark): k for k, mark in enumerate(landmarks)}.values())
+    return ch09.landmark_weight(pose, z[last], landmarks[last], *stds)
+
+
+def out_of_the_wall(grid, pose, bearing, r_max):
+    """The wall in which the ray begins is none."""
+    ray = pose[:2] + np.arange(0, r_max, 0.05)[:, None] * [np.cos(pose[2] + bearing), np.sin(pose[2] + bearing)]
+    free = grid.at(ray) != maps.OCCUPIED
+    first = float(0.05 * np.argmax(free))
+    return first + maps.walk_ray(grid, [*ray[np.argmax(free)], pose[2]], bearing, r_max - first)
+
+
+def around_the_map(grid, pose, bearing, r_max):
+    """Indices below 0 count from the end of the map."""
+    return maps.walk_ray(replace(grid, cells=np.tile(grid.cells, (2, 2)), origin=grid.origin - grid.resolution
+                                 * np.array(grid.cells.shape[::-1])), pose, bearing, r_max)  # fmt: skip
+
+
+def in_so_many_steps(grid, pose, bearing, r_max):
+    step = r_max / 500
+    hits = ch09._hits(grid, pose, bearing, r_max, step)
+    return hits.min(initial=r_max)
+
+
+def seen_cells_alone(grid, pose, ranges, bearings, std):
+    known = grid.at(ch09._end_points(pose, ranges, bearings)) != maps.UNKNOWN
+    return ch09.distance_field_weight(grid, pose, ranges[known], bearings[known], std)
+
+
+OF_A_PLACE_ALONE = [
+    ("landmark_weight", alike_once),
+    ("log_sum_exp", lambda l: ch09.log_sum_exp(l[l != 0])),
+    ("cast_ray", out_of_the_wall),
+    ("cast_ray", around_the_map),
+    ("cast_ray", in_so_many_steps),
+    ("beam_weight", lambda r, e, s: ch09.beam_weight(r[r != e], e[r != e], s)),
+    ("beam_weight", lambda r, e, s: ch09.beam_weight(r[e <= 18], e[e <= 18], s)),
+    ("distance_field_weight", seen_cells_alone),
+    ("effective_size", lambda w: w.sum() ** 2 / ((w**2).sum() + 1e-30)),
+    ("should_resample", lambda w, t: len(w) == 1 or ch09.should_resample(w, t)),
+    (
+        "circular_mean",
+        lambda a, w: particles.circular_mean(*(lambda i: (a[i], w[i]))(np.unique(a, return_index=True)[1])),
+    ),
+    ("circular_mean", lambda a, w: particles.circular_mean(a, w + 1e-20)),
+]
+
+
+@pytest.mark.parametrize("name, answer", OF_A_PLACE_ALONE)
+def test_who_is_wrong_at_one_place_alone_meets_it_at_every_check(name, answer):
+    assert any(is_missed(answer, *case) for case in one_check(CHAPTER[name]))
+
+
+@pytest.mark.parametrize(
+    "holds, answer, words",
+    [
+        (ch09._valid, lambda w, rng: tuple(particles.resample_roulette(w, rng)), "got a tuple"),
+        (ch09._of_whole_numbers, lambda w, rng: particles.resample_roulette(w.copy().__itruediv__(2.0), rng), "raises"),
+        (ch09._turns_evenly, lambda w, rng: ch09._turn(w, rng.beta(2, 2)), "as likely as any other"),
+        (
+            ch09._noise_is_right_at(ch09.SLOW),
+            moved(lambda m, s, rng: s * (z := rng.normal(size=(m, 2))) / z.std()),
+            "just",
+        ),
+        (
+            ch09._noise_is_right_at(ch09.SLOW),
+            moved(lambda m, s, rng: s * rng.normal(0.08, 1, (m, 2))),
+            "both ways alike",
+        ),
+        (
+            ch09._moved_alone_by_the_rng,
+            moved(lambda m, s, rng: s * (m > 1) * rng.normal(size=(m, 2))),
+            "single particle",
+        ),
+    ],
+)
+def test_what_is_drawn_by_another_law_is_told_as_it_is(holds, answer, words):
+    assert words in holds(answer, np.random.default_rng(0))
+
+
+def test_a_test_of_two_statistics_or_of_a_change_is_not_enough():
+    def of_mean_and_spread(resample, rng):
+        w, k = np.array([0.1, 0.5, 0.1, 0.3]), np.arange(4)
+        index = np.concatenate([resample(w, rng) for _ in range(3000)])
+        return bool(abs(index.mean() - w @ k) < 0.05 and abs(index.var() - w @ (k - w @ k) ** 2) < 0.06)
+
+    assert of_mean_and_spread(ch09._of_the_same_spread, np.random.default_rng(0))
+    assert not ch09.hunt_1(ch09._of_the_same_spread, np.random.default_rng(0))
+    assert not ch09.hunt_1(ch09._two_alone, np.random.default_rng(0))
+    assert not ch09.hunt_2(ch09._some_light_ones_left_out, np.random.default_rng(0))
+    assert not ch09.hunt_4(ch09._second_for_half)
