@@ -931,6 +931,7 @@ def test_who_is_wrong_at_one_place_alone_meets_it_at_every_check(name, answer):
             moved(lambda m, s, rng: s * (m > 1) * rng.normal(size=(m, 2))),
             "single particle",
         ),
+        (ch09._moves_whole_numbers, lambda x, *rest: ch09.sample_motion(x, *rest).astype(x.dtype), "whole numbers"),
     ],
 )
 def test_what_is_drawn_by_another_law_is_told_as_it_is(holds, answer, words):

@@ -1886,6 +1886,18 @@ def _reckons(move, states, u, dt, rng):
     )
 
 
+def _moves_whole_numbers(move, rng):
+    """Without noise, from whole numbers; asked where the answer is right for decimals."""
+    states, u = np.array([[1, 2, 1], [-3, 0, 2]]), np.array([1.0, 0.5])
+    moved, right = np.asarray(move(states.copy(), u, 0.2, np.zeros(2), rng)), odometry.step(states, u, 0.2)
+    if moved.shape == right.shape and np.abs(moved - right).max() <= (1e-5 if moved.dtype == np.float32 else 1e-8):
+        return None
+    return (
+        f"right for decimals, but not for states of whole numbers, {states.tolist()}. Does it write into an array of the kind that is "
+        "given, made with `copy` or `zeros_like`? Such an array takes no decimals: `dtype=float` makes it one of decimals."
+    )
+
+
 def _noise_off_is_reckoning(move, rng):
     states = np.array([[0.0, 0, 0], [1, 2, 1.5]])
     moved = move(states.copy(), np.array([1.0, 0.5]), 0.2, np.zeros(2), rng)
@@ -2202,6 +2214,7 @@ CHAPTER = Chapter(
                 _reckons_from_anywhere,
                 _moved_by_the_rng,
                 _moved_alone_by_the_rng,
+                _moves_whole_numbers,
             ),
             hints=(
                 "The noise belongs to the control, not to the pose, and each particle gets its own.",
