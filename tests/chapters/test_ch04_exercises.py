@@ -96,6 +96,16 @@ def test_the_leg_taken_backward_is_no_matter_of_the_root_alone(seed):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+def test_who_compares_the_larger_entry_is_told_of_no_square(seed):
+    def in_a_square(g, B, radius):
+        newton = np.linalg.solve(B, -g)
+        return newton if np.abs(newton).max() <= radius else beyond.bare_dogleg(g, B, radius)
+
+    outcome = judged("dogleg_step", in_a_square, seed)
+    assert outcome.status == NOT_YET and "square" not in outcome.text
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_the_square_of_a_length_is_never_a_length(seed):
     def squares(g, B, radius):
         newton = np.linalg.solve(B, -g)

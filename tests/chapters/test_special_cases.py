@@ -202,6 +202,7 @@ FAR_OR_SMALL = [
     ("gauss_newton_on_pose", lambda T, T_BF, x_S, target: not (frames.transform(T_BF @ T, x_S) - target).any()),
     ("joint_residual", lambda u, *_: np.linalg.norm(u[:3]) > np.pi),
     ("dh_matrix", lambda theta, d, a, alpha: abs(alpha) > np.pi),
+    ("dh_matrix", lambda theta, d, a, alpha: abs(alpha) > 1.5 * np.pi),
     ("moved_part", lambda T_BW, T_WE0, T_WE1, T_BP0: np.array_equal(T_WE0[:3, 3], T_WE1[:3, 3])),
     ("point_covariance", lambda T, cov_T, p, cov_p: cov_T.any() and not np.diag(cov_T).all()),
     ("shares", lambda jacobians, covariances: not all(np.diag(C).all() for C in covariances)),

@@ -175,11 +175,11 @@ STATIONARY = (
     ),
     *(
         (
-            functools.partial(kind_of_point, bends=bends, length=VANISHED, flatter=1e-6),
+            functools.partial(kind_of_point, bends=bends, length=VANISHED, flatter=1e-6, angle_deg=angle_deg),
             "right, but not where f bends a million times less one way than the other. No eigenvalue is 0, and the sign of "
             "each tells:",
         )
-        for bends in (BOWL, DOME, SADDLE, DEEP_SADDLE)
+        for bends, angle_deg in ((BOWL, (30, 60)), (DOME, (-60, -30)), (SADDLE, (-60, -30)), (DEEP_SADDLE, (30, 60)))
     ),
 )
 
@@ -1962,6 +1962,10 @@ CHAPTER = Chapter(
                     "You shorten the Newton step to the radius. The dogleg bends: first downhill, then toward Newton.",
                 ),
                 Mistake(
+                    _uncut_newton,
+                    "The step leaves the trust region: the Newton point counts only when it lies within the radius.",
+                ),
+                Mistake(
                     _wrong_comparison,
                     "You compare |newton|² with the radius: `newton @ newton` is the square of the length. Take the root, or square the radius.",
                     id="dogleg-square",
@@ -1976,10 +1980,6 @@ CHAPTER = Chapter(
                     "NaN on the second leg: is it the root of a negative number? It is b² − ac with c = cornerᵀcorner − radius², which is "
                     "negative there, so that b² − ac is positive.",
                     id="dogleg-nan",
-                ),
-                Mistake(
-                    _uncut_newton,
-                    "The step leaves the trust region: the Newton point counts only when it lies within the radius.",
                 ),
                 Mistake(
                     _newton_or_rim,

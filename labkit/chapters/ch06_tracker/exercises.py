@@ -84,6 +84,11 @@ def obtuse_link(rng):
     return (*(rng.uniform((1.8, 50, 50, 1.8), (3, 300, 300, 3)) * rng.choice([-1, 1], 4)),)
 
 
+def long_link_turned_far(rng):
+    """Parameters of a long link that turns by three quarters of a turn and more about both of its axes."""
+    return (*(rng.uniform((4.8, 500, 500, 4.8), (6.2, 3000, 3000, 6.2)) * rng.choice([-1, 1], 4)),)
+
+
 def link_without(rng, k):
     """Parameters of a link of which the k-th is 0."""
     return (*(rng.uniform((0.3, 50, 50, 0.3), (3, 300, 300, 1.5)) * rng.choice([-1, 1], 4) * (np.arange(4) != k)),)
@@ -836,6 +841,11 @@ CHAPTER = Chapter(
                     for k, name in enumerate(("theta", "d", "a", "alpha"))
                 ),
                 (square_link, metrics.Poses(1e-6, 1e-6), "right, but not where alpha is 90 deg or -90 deg:"),
+                (
+                    long_link_turned_far,
+                    metrics.Poses(1e-6, 1e-6),
+                    "right, but not for a link of half a meter and more that is turned by more than three quarters of a turn:",
+                ),
                 *(
                     (
                         functools.partial(scaled, draw=obtuse_link, factors=factors),
