@@ -517,7 +517,8 @@ STATUSES = (
             lambda h, o, b, m: "misprint" if m else _real_word(h, o, b, m),
             lambda h, o, b, m: "misprint" if m else _simulated_word(h, o, b, m),
         ),
-        "*misprint* comes last: ask for `simulated` first, then for *reproduced* and *rounding*.",
+        "Ask for `simulated` first, then for *reproduced* and *rounding*, and only then for *misprint*.",
+        "status-e25a21",
     ),
     (
         _judged(lambda h, o, b, m: "rounding" if o <= h + b else _real_word(h, o, b, m)),
@@ -600,7 +601,8 @@ STATUSES = (
         _judged(
             lambda h, o, b, m: "misprint" if m else _real_word(h, o, b, m),
         ),
-        "*misprint* comes last: ask for *reproduced* and *rounding* before it. A number that comes out is no misprint.",
+        "Ask for *reproduced* and *rounding* before *misprint*: a number that comes out is no misprint.",
+        "status-34b61e",
     ),
     (
         _judged(
