@@ -25,7 +25,7 @@ SPOILT = 2  # times as far off is a part that a change makes worse than it was, 
 ANGLES = re.compile(r"rad|deg|angle|(?<!re)turn|rot|axis|axes|theta|phi|psi|sin|cos|tan|pose|frame", re.IGNORECASE)
 SCALED = re.compile(  # of a choice, which does not depend on how large all is that is compared
     "half of it|twice as much|a thousand|it belongs there in|its (square|root|reciprocal|log|exp|sine|tangent)"
-    "|it is to be (multiplied|divided) by"
+    "|it is to be (multiplied|divided) by|the (square|root) of this"
 )
 CURVED = re.compile(
     "its (log|exp|sine|tangent|inverse|reciprocal)"
