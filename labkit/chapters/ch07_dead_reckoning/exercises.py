@@ -1142,6 +1142,7 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda a, b, l: np.array([(a + b) / 2, abs(b - a) / l]),
                     "Your turn rate is never negative, as with an absolute value or the wheels sorted. A turn to the right has omega < 0.",
+                    id="wheel_to_twist-2346f4",
                 ),
                 Mistake(
                     lambda a, b, l: np.array([(a + b) / 2, (b - a) / l if a + b else 0.0]),
@@ -2264,6 +2265,7 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda v, d, L: np.array([v, abs(v) * np.tan(d) / L]),
                     "Your car turns to the side of its wheels in reverse as well. Backward it turns the other way: omega changes its sign with v.",
+                    id="ackermann_twist-697df0",
                 ),
                 Mistake(
                     lambda v, d, L: np.array([v, v * np.tan(np.radians(d)) / L]),
