@@ -33,6 +33,7 @@ CURVED = re.compile(
 LIFTED = re.compile(  # what brings a number over a bound, whatever is wrong
     "a thousand|divided by its( own)? length|multiplied by the length of"
 )
+RESCALED = re.compile("to be (multiplied|divided) by")  # as LIFTED, where bounds decide between words
 NAMES = re.compile(r"[^\W\d]\w*")
 FIRST_ROUND = "it is right in the first round, not in all behind it"
 ONE_ENTRY, ONE_ROW = re.compile(r"\bentry\b"), re.compile(r"\brow(?=s?\b)")  # of a value that has several rounds
@@ -184,6 +185,7 @@ class Search:
         self.values = _traces(written, self.cases, budget)
         self.exactly = all(isinstance(c.metric, metrics.Exactly) for c in self.cases)
         self.chosen = self.exactly and all(type(c.expected) is int for c in self.cases)
+        self.worded = self.exactly and all(isinstance(c.expected, str) for c in self.cases)
         self.turns = any(map(ANGLES.search, written.lines.values()))
         self.right_for_whole = True
 
@@ -335,7 +337,7 @@ class Search:
         """
         if self.chosen and SCALED.match(mends) or self.exactly and CURVED.match(mends):
             return False
-        if self.exactly and LIFTED.search(mends):
+        if self.exactly and LIFTED.search(mends) or self.worded and RESCALED.search(mends):
             return False
         return self.turns or not mends.endswith(("radians", "degrees"))
 

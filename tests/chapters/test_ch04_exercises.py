@@ -664,5 +664,16 @@ def without_small_slopes(x):
     return g
 
 
+def test_a_bound_beside_the_largest_entry_is_no_matter_of_the_gradient():
+    def by_a_bound(g, H):
+        if np.linalg.norm(g) > 1e-6:
+            return "not stationary"
+        s = np.linalg.eigvalsh(H / np.abs(H).max())
+        return "minimum" if s[0] > 1e-6 else "maximum" if s[1] < -1e-6 else "saddle"
+
+    told = judged("classify_extremum", by_a_bound)
+    assert told.status == NOT_YET and "divided by" not in told.text and "its mean" not in told.text, told.text
+
+
 def test_what_sets_small_slopes_to_zero_may_be_needless():
     assert "if this case is needed at all" in judged("gradient", without_small_slopes).text
