@@ -1217,7 +1217,7 @@ def _instead(statement):
     """(words, what is wrong where it mends, statements) of what may stand in a statement's place."""
     kinds = ast.Assign | ast.AugAssign | ast.If | ast.For | ast.Expr
     if isinstance(statement, kinds) and not _is_told(statement):
-        yield "without one of its steps", "this step is too many", [ast.Pass()]
+        yield "without one of its steps", "this statement is too many", [ast.Pass()]
     if isinstance(statement, ast.AugAssign):
         sign = f"`{ast.unparse(statement).removeprefix(ast.unparse(statement.target)).split()[0]}`"
         mends = f"{sign} keeps what was there before, which does not belong to the result: `=`"

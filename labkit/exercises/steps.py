@@ -53,7 +53,7 @@ NEARER = {  # what brings a result nearer on every draw, and what is said where 
 }
 COMES_NEARER = "the result comes nearer on every draw, and is not there yet"
 TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
-NO_CASE = re.compile("(never|always) happen$|belongs there in all cases$|^this step is too many$")
+NO_CASE = re.compile("(never|always) happen$|belongs there in all cases$|^this statement is too many$")
 TURNED, OTHER_SIGN = "has the wrong sign", "the sign is the other one"
 UNEQUAL = ("where `==` belongs", "where `!=` belongs")  # what computed numbers are never, or always
 TRUTHS = {"`0` belongs": "`False` belongs", "`1` belongs": "`True` belongs"}

@@ -136,7 +136,7 @@ def test_the_line_and_the_slip_are_told(right, wrong, said):
                 r = a - 2 * r
             return len(b) * np.linalg.norm(r)
             """,
-            "in line 4, `if r[0] < 0.3:`: this step is too many.",
+            "in line 4, `if r[0] < 0.3:`: this statement is too many.",
         ),
         (
             """

@@ -1425,7 +1425,7 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3].T, T[:3, 3]), c)),
                         "Your rotation is the transpose: perhaps the nine unknowns came back in the other order (rows and columns).", id="linear_start-5d0710"),
-                Mistake(_linear(lambda T, c: (T, -c)), "The target has the wrong sign: it stands on the other side of the equation, with -R_BF^T."),
+                Mistake(_linear(lambda T, c: (T, -c)), "The target has the wrong sign: beside R_FS x + t_FS stands -R_BF^T target.", id="linear_start-8ce953"),
                 Mistake(_linear_without_rotation, "On noisy data your nine numbers are not a rotation: take the nearest one."),
                 Mistake(_linear(lambda T, c: (frames.invert(T), c)), "Your pose is the inverse, T_SF."),
                 Mistake(_linear(lambda T, c: (frames.pose(T[:3, :3], -T[:3, 3]), c)), "The translation of T_FS has the wrong sign."),
