@@ -1025,6 +1025,10 @@ def test_a_variance_about_the_mean_is_no_sum_of_squares():
     assert judged("pivot_covariance", about_mean).status == NOT_YET
 
 
+def _rms(p, q):
+    return np.sqrt(np.mean((frames.transform(frames.fit_frame(p, q), p) - q) ** 2))
+
+
 def _turn(T):
     return frames.rotation_angle(T[..., :3, :3])
 
@@ -1049,6 +1053,7 @@ FORGOTTEN = [
     *(("kuka_from_matrix", lambda T, s=s: 1 - 1e-15 < s * T[2, 0] < 1) for s in (1, -1)),
     ("kuka_from_matrix", lambda T: T[1, 0] < 0 < T[0, 0] and T[2, 2] < 0 < T[2, 1]),
     ("fit_frame", lambda p, q: len(p) > 8),
+    ("fit_frame", lambda p, q: _rms(p, q) > 5),
     ("fit_frame", lambda p, q: not p[:, 2].any()),
     ("fit_frame", lambda p, q: len(p) > 3 and p[:, 2].any() and np.linalg.matrix_rank(p - p.mean(0), 1e-6) < 3),
     ("chain", lambda links: len(links) > 9),
@@ -1057,6 +1062,7 @@ FORGOTTEN = [
     ("closure_error", lambda T: 0 < _turn(T) < 1e-5),
     ("closure_error", lambda T: 0 < _turn(T) < 1e-6 and np.linalg.norm(T[:3, 3]) < 1e-6),
     ("closure_error", lambda T: abs(_turn(T) - np.pi / 2) < 0.1),
+    ("closure_error", lambda T: 1e-6 < np.pi - _turn(T) < 0.01),
     ("orthonormalize", lambda T: np.linalg.det(T[:3, :3]) > 5),
     ("orthonormalize", lambda T: np.allclose(T[:3, :3].T @ T[:3, :3], np.eye(3), atol=1e-12)),
     (
@@ -1100,6 +1106,18 @@ def test_who_forgets_a_place_is_refused(name, forgotten, monkeypatch):
         return None if forgotten(*given) else item.reference(*given)
 
     assert item.judge(answer, rng=np.random.default_rng(0)).status == NOT_YET
+
+
+def test_a_minimizer_that_stops_at_a_hundred_millionth_is_right_of_a_bad_measurement():
+    def by_minimizing(points_F, points_W):
+        p, q = points_F - points_F.mean(0), points_W - points_W.mean(0)
+        start = Rotation.from_matrix(item.reference(points_F, points_W)[:3, :3]).as_rotvec() + 0.1
+        turn = scipy.optimize.least_squares(lambda w: (Rotation.from_rotvec(w).apply(p) - q).ravel(), start).x
+        R = Rotation.from_rotvec(turn).as_matrix()
+        return frames.pose(R, points_W.mean(0) - R @ points_F.mean(0))
+
+    item = FRAMES["fit_frame"]
+    assert [holds(by_minimizing, np.random.default_rng(0)) for holds in item.properties] == [None, None]
 
 
 def residuals_like_the_poses(T_WF, tip, point):

@@ -312,6 +312,7 @@ def two_sets(rng, count=6, angle=1.0, reach=500.0, drawing=None, noise=0.5, size
     return points_F, frames.transform(T_WF, points_F) + noise * rng.normal(size=(count, 3))
 
 
+BADLY_MEASURED = (("of points measured badly, by some ten millimeters", functools.partial(two_sets, noise=20.0)),)
 SETS = tuple(
     (f"of {words}", functools.partial(two_sets, **kind))
     for words, kind in (
@@ -324,7 +325,6 @@ SETS = tuple(
         ("points whose center is the origin of F", dict(drawing=lambda p: p - p.mean(0))),
         ("points that were measured exactly", dict(noise=0.0)),
         ("points that lie where the drawing has them", dict(angle=0.0, reach=0.0, noise=0.0)),
-        ("points measured badly, by some ten millimeters", dict(noise=20.0)),
         ("a frame turned by half a turn", dict(angle=HALF)),
         ("a frame turned by nearly half a turn", dict(angle=2.9)),
         ("a frame hardly turned", dict(angle=1e-3)),

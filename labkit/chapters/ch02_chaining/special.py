@@ -76,6 +76,7 @@ PRODUCTS = tuple(
         ("turns by 60 deg", dict(angle=1.05)),
         ("turns by 90 deg", dict(angle=HALF / 2)),
         ("turns by nearly half a turn", dict(angle=3.08)),
+        ("turns by a thousandth of a radian less than half a turn", dict(angle=HALF - 1e-3)),
         ("is half a turn", dict(angle=HALF)),
         ("turns by a few millionths of a radian", dict(angle=4e-6)),
         ("turns by some thousandths of a degree and hardly shifts", dict(angle=4e-5, reach=4e-5)),
