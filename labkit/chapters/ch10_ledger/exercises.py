@@ -267,6 +267,12 @@ def _letters_behind_the_point(printed):
     return _ends_at_the_exponent(printed) if has_a_point else half_unit(printed)
 
 
+def _exponent_of_the_size(printed):
+    """The exponent as it would be with one digit before the point."""
+    mantissa, mark, _ = printed.partition("e")
+    return half_unit(mantissa) * 10.0 ** np.floor(np.log10(abs(_number(printed)))) if mark else half_unit(printed)
+
+
 def _exponents_above_0_dropped(printed):
     number, _, exponent = printed.partition("e")
     return half_unit(printed if exponent.startswith("-") else number)
@@ -740,6 +746,11 @@ CHAPTER = Chapter(
                         "An exponent may be positive as well: 3.20e3 has two decimals, and its last digit is worth 10.",
                     )
                     for variant in (_negative_exponents_alone, _exponents_below_0, _exponents_above_0_dropped)
+                ),
+                Mistake(
+                    _exponent_of_the_size,
+                    "You take the exponent from the size of the number, which tells it where one digit stands before the point: 44.1e-1 "
+                    "is 4.41, and its exponent is -1. Read it from the string.",
                 ),
                 Mistake(
                     _all_letters_without_a_point,
