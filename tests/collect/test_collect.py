@@ -211,11 +211,11 @@ def test_a_prediction_an_unfinished_exercise_and_a_missing_cell_are_told_apart()
 def test_a_step_that_is_wrong_is_told_by_its_line_as_in_the_notebook():
     """What is known of a function's code and of its values on the way crosses the border."""
     wrong = "@ex.relative\ndef relative(A, B):\n    back = np.linalg.inv(A)\n    onward = B.T\n    return back @ onward"
-    masked = "@ex.normalize\ndef normalize(v):\n    v = np.asarray(v)\n    return v / np.sqrt(v[v > 0] @ v[v > 0])"
+    masked = "@ex.normalize\ndef normalize(v):\n    w = v[v**2 < v @ v / 2]\n    return v / (1e-9 + np.sqrt(w @ w))"
     cells = replaced(replaced(solved_cells(), "relative", wrong), "normalize", masked)
     items = batch.judged(notebook_text(cells).encode(), 1)["items"]
     assert "n line 4, `B.T`: one transpose is too many." in items["relative"]["text"]
-    assert "n line 4, `np.sqrt(v[v > 0] @ v[v > 0])`" in items["normalize"]["text"]
+    assert "n line 4, `1e-9 + np.sqrt(w @ w)`" in items["normalize"]["text"]
 
 
 def test_a_stage_computes_for_a_value_but_not_while_an_answer_is_judged():

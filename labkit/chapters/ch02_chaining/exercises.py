@@ -1203,6 +1203,7 @@ CHAPTER = Chapter(
                 Mistake(
                     _forward_instead_of_back,
                     "This is what poses moved by +k/N xi give, on in the direction of the error: now the loop is twice as far open. The pose after k links goes back by k/N.",
+                    id="distribute_closure-1045e8",
                 ),
                 Mistake(
                     _divided_by(lambda n: n + 1),

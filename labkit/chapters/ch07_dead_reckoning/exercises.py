@@ -713,6 +713,22 @@ def _covariance(var_v, var_omega):
     return variant
 
 
+def _without_absolute_values():
+    """The control's covariance with one or more of its three absolute values left out."""
+    places = ("|v| in the first variance", "|omega| in the second", "|v| in the second")
+    left_out = ((0,), (1,), (2,), (1, 2), (0, 2), (0, 1, 2), (0, 1))
+    for number, which in enumerate(left_out, 1):
+        first, turn, drift = (float if k in which else abs for k in range(3))
+        yield Mistake(
+            _covariance(
+                lambda v, w, t, a, b, c, first=first: a * first(v) / t,
+                lambda v, w, t, a, b, c, turn=turn, drift=drift: (b * turn(w) + c * drift(v)) / t,
+            ),
+            f"No variance is negative, though v and omega may be: it is {' and '.join(places[k] for k in which)}.",
+            id="control_covariance-9dac3b" + (f"-{number}" if number > 1 else ""),
+        )
+
+
 def propagate(x, cov, u, dt, cov_u):
     return odometry.propagate(x, cov, u, dt, cov_u, "euler")
 
@@ -932,6 +948,16 @@ CHAPTER = Chapter(
                         "may not arrive:",
                     )
                     for left in (True, False)
+                ),
+                *(
+                    (
+                        functools.partial(at_places, robot=(0.5, 0.5), start=(0.4, 0.002), left=left, angle=angle),
+                        metrics.Numbers(1e-8, "m"),
+                        "right, but not from a start hardly beside that line: Newton's steps stay on their side of the line "
+                        "through both landmarks (do yours begin at `start`, and nowhere else?):",
+                    )
+                    for left in (True, False)
+                    for angle in (0.0, np.pi / 2)
                 ),
                 (
                     from_a_millimeter_aside,
@@ -1600,51 +1626,7 @@ CHAPTER = Chapter(
                 "`v, omega = np.abs(u)\nreturn np.diag([k_d * v / dt, (k_theta * omega + k_drift * v) / dt])`",
             ),
             mistakes=[
-                Mistake(
-                    _covariance(
-                        lambda v, w, t, a, b, c: a * v / t,
-                        lambda v, w, t, a, b, c: (b * abs(w) + c * abs(v)) / t,
-                    ),
-                    "An absolute value is missing: |v| belongs into both variances and |omega| into the second, for reversing and for right turns.",
-                    id="control_covariance-9dac3b",
-                ),
-                Mistake(
-                    _covariance(
-                        lambda v, w, t, a, b, c: a * abs(v) / t,
-                        lambda v, w, t, a, b, c: (b * w + c * abs(v)) / t,
-                    ),
-                    "An absolute value is missing: |v| belongs into both variances and |omega| into the second, for reversing and for right turns.",
-                    id="control_covariance-9dac3b-2",
-                ),
-                Mistake(
-                    _covariance(
-                        lambda v, w, t, a, b, c: a * abs(v) / t,
-                        lambda v, w, t, a, b, c: (b * abs(w) + c * v) / t,
-                    ),
-                    "An absolute value is missing: |v| belongs into both variances and |omega| into the second, for reversing and for right turns.",
-                    id="control_covariance-9dac3b-3",
-                ),
-                Mistake(
-                    _covariance(
-                        lambda v, w, t, a, b, c: a * abs(v) / t,
-                        lambda v, w, t, a, b, c: (b * w + c * v) / t,
-                    ),
-                    "An absolute value is missing: |v| belongs into both variances and |omega| into the second, for reversing and for right turns.",
-                    id="control_covariance-9dac3b-4",
-                ),
-                Mistake(
-                    _covariance(
-                        lambda v, w, t, a, b, c: a * v / t,
-                        lambda v, w, t, a, b, c: (b * abs(w) + c * v) / t,
-                    ),
-                    "An absolute value is missing: |v| belongs into both variances and |omega| into the second, for reversing and for right turns.",
-                    id="control_covariance-9dac3b-5",
-                ),
-                Mistake(
-                    _covariance(lambda v, w, t, a, b, c: a * v / t, lambda v, w, t, a, b, c: (b * w + c * v) / t),
-                    "An absolute value is missing: |v| belongs into both variances and |omega| into the second, for reversing and for right turns.",
-                    id="control_covariance-9dac3b-6",
-                ),
+                *_without_absolute_values(),
                 Mistake(
                     _covariance(lambda v, w, t, a, b, c: a * abs(v), lambda v, w, t, a, b, c: b * abs(w) + c * abs(v)),
                     "The division by T is missing: the constants speak of ways, the variances of speeds.",
