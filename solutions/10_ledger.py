@@ -64,7 +64,7 @@ ex.predict("digits", guess, reveal=partial(LedgerTable, found))
 @ex.half_unit
 def half_unit(printed):
     """Return half a unit in the last digit of a printed number, a string such as
-    "1.010000", "-0,5", "12" or "3e-4"."""
+    "1.010000", "-0,5", "12", "3e-4" or "1.2e+03"."""
     ### BEGIN SOLUTION
     number, _, exponent = printed.partition("e")
     decimals = len(number.replace(",", ".").partition(".")[2])

@@ -22,6 +22,7 @@ FORMS = (
     "dd.d",
     "ddd.dddd",
     "dek",
+    "d.de+0k",
     "d.dde-k",
     "d,de-k",
     "d,dek",
@@ -276,6 +277,11 @@ def _exponent_of_the_size(printed):
 def _exponents_above_0_dropped(printed):
     number, _, exponent = printed.partition("e")
     return half_unit(printed if exponent.startswith("-") else number)
+
+
+def _exponents_with_a_plus_dropped(printed):
+    number, _, exponent = printed.partition("e")
+    return half_unit(number if exponent.startswith("+") else printed)
 
 
 def _exponents_below_0(printed):
@@ -746,6 +752,11 @@ CHAPTER = Chapter(
                         "An exponent may be positive as well: 3.20e3 has two decimals, and its last digit is worth 10.",
                     )
                     for variant in (_negative_exponents_alone, _exponents_below_0, _exponents_above_0_dropped)
+                ),
+                Mistake(
+                    _exponents_with_a_plus_dropped,
+                    "An exponent may stand behind a plus: 3.2e+03 has one decimal, and its last digit is worth 100.",
+                    id="half_unit-plus",
                 ),
                 Mistake(
                     _exponent_of_the_size,
