@@ -151,6 +151,13 @@ def _iterated(tree):
             yield statement.lineno
 
 
+def _outwards(node, outer):
+    """The larger parts of the code in which a part stands, one in the other, up to the statement."""
+    while isinstance(outer[node], ast.expr):
+        node = outer[node]
+        yield node
+
+
 class Written:
     """A function that was read again, with the functions `beside` it, [(function, definition)], that it calls.
 
@@ -205,7 +212,7 @@ class Written:
 
     @functools.cached_property
     def _around(self):
-        """{part of the code: the larger part in which it stands} of those that look alike to others in their line."""
+        """{part of the code: the larger part that tells it from others} of those that look alike in their line."""
         found = {}
         for tree in self.trees:
             outer = {part: node for node in ast.walk(tree) for part in ast.iter_child_nodes(node)}
@@ -214,8 +221,10 @@ class Written:
                 if isinstance(node, ast.expr):
                     alike.setdefault((node.lineno, _shown(node, self.lines)), []).append(node)
             for nodes in alike.values():
-                around = [outer[node] for node in nodes if len(nodes) > 1]
-                found |= {n: _shown(o, self.lines) for n, o in zip(nodes, around) if isinstance(o, ast.expr)}
+                larger = [[_shown(o, self.lines) for o in _outwards(node, outer)] for node in nodes if len(nodes) > 1]
+                for node, own in zip(nodes, larger):
+                    others = {text for texts in larger if texts is not own for text in texts}
+                    found |= {node: next((text for text in own if text not in others), own[0])} if own else {}
         return found
 
     def results(self, plans, args, seconds, keep):

@@ -1365,6 +1365,12 @@ def test_a_variable_is_put_together_with_what_it_holds_by_then():
         assert found.results([("own", there, divided, variable)], drawn, 1.0, lambda result: result) == [(2.0,)]
 
 
+def test_the_larger_part_is_one_that_stands_there_once():
+    written = rerun.written(typed("n = len(a)\nreturn 1 / (n - 1) * (a @ a) + 1 / (n - 1) * (b @ b)"))
+    told = {code for _, _, code, _ in written.changes if code.startswith("n - 1` in")}
+    assert told == {"n - 1` in `1 / (n - 1) * (a @ a)", "n - 1` in `1 / (n - 1) * (b @ b)"}
+
+
 def test_of_several_comparisons_in_a_row_it_is_said_which():
     changes = rerun.written(typed("return 0 < a < b")).changes
     assert any(mends == "the second `<` stands where `<=` belongs" for *_, mends in changes)
