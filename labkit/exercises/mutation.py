@@ -879,6 +879,7 @@ REVERSED = (  # (words of what was changed in a right formula, what is wrong whe
     (DIVISOR, "the divisor alone belongs there"),
     (r"with (.+) where (.+) belongs", r"\2 stands where \1 belongs"),
     (r"without one of its (.+)s", r"one \1 is too many"),
+    (r"without one side of `(\w+)`", r"one side of `\1` is too many"),
     (r"without the term `(\w+)` in one place", r"the term `\1` is too many"),
     (r"without one matrix of a product", "one matrix of the product is too many"),
     (r"without `(\w+)=` in one call", r"`\1=` does not belong there"),
@@ -1125,11 +1126,11 @@ def _comparison(node, names):
 
 
 def _conditions(node, names):
-    other = ast.Or() if isinstance(node.op, ast.And) else ast.And()
+    joined, other = ("and", ast.Or()) if isinstance(node.op, ast.And) else ("or", ast.And())
     yield 0, "with `and` and `or` exchanged in one place", ast.BoolOp(other, node.values)
     for i in range(len(node.values)):
         rest = [*node.values[:i], *node.values[i + 1 :]]
-        yield 1, "without one of its conditions", rest[0] if len(rest) == 1 else ast.BoolOp(node.op, rest)
+        yield 1, f"without one side of `{joined}`", rest[0] if len(rest) == 1 else ast.BoolOp(node.op, rest)
 
 
 def _cases(node, names):

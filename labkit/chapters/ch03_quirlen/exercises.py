@@ -122,6 +122,11 @@ def _blocks(left, right):
     return variant
 
 
+def _seen_from_the_flange(T_WF):
+    back = T_WF[:, :3, :3].swapaxes(1, 2)
+    return np.concatenate([np.broadcast_to(np.eye(3), back.shape), -back], axis=2).reshape(-1, 6)
+
+
 def _side_by_side(T_WF):
     return np.hstack([np.vstack([T[:3, :3], -np.eye(3)]) for T in T_WF])
 
@@ -247,6 +252,12 @@ CHAPTER = Chapter(
                 Mistake(
                     _blocks(lambda R: -R, np.eye(3)),
                     "Both blocks have the opposite sign. That solves the same problem with +p on the right, but the sheet's right-hand side is -p.",
+                ),
+                Mistake(
+                    _seen_from_the_flange,
+                    "These are the right rows multiplied by Rᵀ, which the right-hand side, -p, is not: R stands before the tip, and -I "
+                    "before the pivot.",
+                    id="pivot-matrix-from-the-flange",
                 ),
                 Mistake(
                     lambda T_WF: pivot.pivot_matrix(T_WF)[:, [3, 4, 5, 0, 1, 2]],
@@ -595,6 +606,12 @@ CHAPTER = Chapter(
                         id=f"tip-of-pose-{k}",
                     )
                     for k in (0, -1)
+                ),
+                Mistake(
+                    lambda: np.linalg.norm(lab_sheet.kreisel_poses()[:, :3, 3].mean(axis=0) - _kreisel().pivot),
+                    "This is how far the pivot is from the mean of all flanges, which lies nearer than each of them. The length of the "
+                    "tool itself is that of the tip, x[:3].",
+                    id="tip-of-mean-flange",
                 ),
                 Mistake(
                     lambda: np.linalg.norm(_kreisel().tip - _kreisel().pivot),
@@ -1005,7 +1022,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda distances, scale: np.maximum(1 - (distances / scale) ** 2, 0) ** 2,
-                    "The cutoff is missing: it is 7 times the scale, not the scale itself.",
+                    "The cutoff is 7 times the scale. Here the weights are 0 from the scale itself on.",
+                    id="robust_weights-c7dddb",
                 ),
                 Mistake(
                     lambda distances, scale: np.maximum(1 - (distances / pivot.TUKEY) ** 2, 0) ** 2,
