@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from . import budget, guard, metrics
+from . import budget, guard, metrics, rerun
 from .budget import Budget
 from .evidence import MORE_CASES, Evidence
 from .outcome import NOT_YET
@@ -39,15 +39,25 @@ class Named(Evidence):
         return self._is_it_on(mistake, (self.exercise.plain_again[number] for number in range(ONCE_MORE)))
 
     def _is_it_again(self, mistake):
-        """Whether an answer is equal to a mistake on fresh draws too, where it is one of several, some of them, or a
-        truth value, or is wrong on a few draws alone: two rules may decide alike by chance.
+        """Whether an answer is equal to a mistake on fresh draws too, where it is one of several, some of them, a truth
+        value, or an argument as it came, or is wrong on a few draws alone: two rules may decide alike by chance.
         """
-        decides = isinstance(self.exercise.metric, metrics.Exactly) or self._is_seldom_wrong()
+        chosen = isinstance(self.exercise.metric, metrics.Exactly) or self._is_given()
+        decides = chosen or self._is_seldom_wrong()
         if not decides or self.refusal or self._right_on_plain():
             return True
         if isinstance(self.pairs[0][1], str):
             return self._shows_always(mistake)
         return self._is_it_on(mistake, (self.exercise.plain_again[number] for number in range(MORE_DRAWS)))
+
+    def _is_given(self):
+        """Whether all that is wrong on plain draws is one argument, as a search gives that has found nothing."""
+        metric = self.exercise.metric
+        wrong = [] if metric is None else [(a, p[0]) for a, m, p in self._cases() if not m.equal(*p)]
+        return any(
+            all(np.array_equal(rerun.numeric(result), rerun.numeric(args[k])) for args, result in wrong)
+            for k in range(len(wrong[0][0]) if wrong else 0)
+        )
 
     def _is_seldom_wrong(self):
         metric = self.exercise.metric

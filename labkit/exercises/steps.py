@@ -109,8 +109,8 @@ class Case:
         parts = self.right_parts(result)
         if not set(right) <= set(parts):
             return 0
-        simple = relations.difference_words(self.metric, [(result, self.expected)], (), True)
-        return 100 if simple else len(parts) - len(right)
+        simple, was_simple = (_difference_words([self], [one]) for one in (result, self.result))
+        return 100 if simple not in (None, was_simple) else len(parts) - len(right)
 
     def distances(self, result):
         """How far off each part of an admitted result is, by what is compared there."""
@@ -588,8 +588,9 @@ class Search:
                 found.append(kept[0])
         if len(found) < len(self.cases):
             return None
-        words = relations.difference_words(self.cases[0].metric, self._pairs(found), (), True)
-        if words and not self._are_given(found):
+        words = _difference_words(self.cases, found)
+        is_new = words not in (None, _difference_words(self.cases, [case.result for case in self.cases]))
+        if is_new and not self._are_given(found):
             return words
         parts = [case.right_parts(result) for case, result in zip(self.cases, found)]
         if any(not set(before) <= set(after) for before, after in zip(right, parts)):
@@ -610,9 +611,6 @@ class Search:
         drawn = [(rerun.numeric(result), case.args) for result, case in zip(results, self.cases)]
         columns = [[(r, rerun.numeric(args[i])) for r, args in drawn] for i in range(len(self.names))]
         return any(all(r is not None and a is not None and _same(r, a) for r, a in column) for column in columns)
-
-    def _pairs(self, results):
-        return [(result, case.expected) for result, case in zip(results, self.cases)]
 
     # Values of the solution
 
@@ -864,6 +862,14 @@ def search(function, names, cases, judging, budget):
     """A `Search` for what is wrong in a function; None where its code cannot be read again."""
     written = rerun.written(function)
     return written and Search(written, names, cases, judging, budget)
+
+
+def _difference_words(cases, results):
+    """What admitted results have to do with the right ones of their draws, in words; None where one was refused."""
+    if any(result is None for result in results):
+        return None
+    pairs = [(result, case.expected) for result, case in zip(results, cases)]
+    return relations.difference_words(cases[0].metric, pairs, (), True)
 
 
 def _comes_nearer(case, found):

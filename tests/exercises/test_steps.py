@@ -1365,6 +1365,12 @@ def test_a_variable_is_put_together_with_what_it_holds_by_then():
         assert found.results([("own", there, divided, variable)], drawn, 1.0, lambda result: result) == [(2.0,)]
 
 
+def test_a_difference_that_was_there_before_is_no_gain():
+    expected = np.array([1.2, 2.4, 3.6])
+    case = steps.Case((), metrics.Numbers(), expected, result=2 * expected)
+    assert case.gain((2 * expected,), []) == 0 and case.gain((-expected,), []) == 100
+
+
 def test_the_larger_part_is_one_that_stands_there_once():
     written = rerun.written(typed("n = len(a)\nreturn 1 / (n - 1) * (a @ a) + 1 / (n - 1) * (b @ b)"))
     told = {code for _, _, code, _ in written.changes if code.startswith("n - 1` in")}
