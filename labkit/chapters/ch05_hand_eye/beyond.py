@@ -710,6 +710,11 @@ TRIANGULATION = [
                 id="height-right-angle",
             ),
             Mistake(
+                lambda alpha, beta, base: base / 2 * np.tan((alpha + beta) / 2),
+                "This is the height of a triangle with two equal sides, whose angles are the mean of both. Here they differ.",
+                id="height-of-equal-sides",
+            ),
+            Mistake(
                 lambda alpha, beta, base: triangulation.height_from_angles(np.deg2rad(alpha), np.deg2rad(beta), base),
                 "The angles are in rad already: `np.tan` takes them as they are.",
                 id="height-degrees",

@@ -369,6 +369,11 @@ def _kuka_in_flange(p2, T_BF, x_S, target):
     return seen - frames.transform(frames.invert(T_BF), np.tile(target, (len(x_S), 1)))
 
 
+def _kuka_in_scanner(p2, T_BF, x_S, target):
+    from_base = frames.invert(T_BF @ frames.matrix_from_kuka(p2))
+    return x_S - frames.transform(from_base, np.tile(target, (len(x_S), 1)))
+
+
 def _kuka_angles(sequence):
     """Reads the three angles in another order."""
 
@@ -1118,6 +1123,7 @@ CHAPTER = Chapter(
                 Mistake(lambda p2, T, x, c: frames.transform(T, x) - c, "T_FS is missing: x_S is still in the scanner's frame when T_BF meets it."),
                 Mistake(_kuka_flange_inverse, "You used the inverse of T_BF: it maps F to B, as it stands."),
                 Mistake(_kuka_in_flange, "These are the residuals along the axes of F, as if the target were brought into the flange. (4-3) brings the sphere into B.", id="kuka_residual-in-flange"),
+                Mistake(_kuka_in_scanner, "These are the residuals along the axes of S, as if the target were brought into the scanner. (4-3) brings the sphere into B.", id="kuka_residual-in-scanner"),
                 Mistake(_kuka_angles("XYZ"), "You turned by A about x and by C about z. KUKA: A about z, then B about y, then C about x."),
                 Mistake(_kuka_angles("zyx"), "You turned about fixed axes. A, B, C turn about axes that move along: Rz(A) Ry(B) Rx(C)."),
                 Mistake(_kuka_without_target, "The target is missing: these are positions of the sphere in the base, not residuals."),

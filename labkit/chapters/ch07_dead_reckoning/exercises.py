@@ -893,6 +893,12 @@ CHAPTER = Chapter(
                     "You square the measured distance, but not the computed one.",
                 ),
                 Mistake(
+                    lambda L, d, p: 2 * d * (np.linalg.norm(L - p, axis=1) - d),
+                    "2 d (|l - p| - d) is nearly the difference of the squares, close to the circle alone. Square both, then "
+                    "subtract.",
+                    id="lateration_residual-linearized",
+                ),
+                Mistake(
                     lambda L, d, p: (np.linalg.norm(L - p, axis=1) - d) ** 2,
                     "Square first, then subtract: (a - b)^2 is not a^2 - b^2.",
                 ),
