@@ -130,10 +130,12 @@ class Staying(Evidence):
             run = guard.run(self.function, args, admitted, exercise.limit)
             if before.error is not None or run.error is not None or exercise.metric.equal(run.result, expected):
                 continue
-            if same_numbers(numbers_of(run.result), numbers_of(before.result)):
+            as_then = same_numbers(numbers_of(run.result), numbers_of(before.result))
+            if as_then or self._is_right_on(self.defaults.fresh, args, exercise.metric, expected):
+                told = "returns what it returned then, which is right no more" if as_then else "is right no more"
                 return (
                     f"right at first, but called again with another `{name}` and all else as before, your function "
-                    "returns what it returned then, which is right no more: is a result kept, and found again by a "
-                    f"part of the arguments alone?{self._about_globals()}"
+                    f"{told}: is something kept, and found again by a part of the arguments alone?"
+                    f"{self._about_globals()}"
                 )
         return None
