@@ -13,7 +13,7 @@ from .budget import Budget
 from .named import MORE_DRAWS, Named
 from .outcome import Mistake
 from .results import Refusal, are_one, could_change, equal_as_written, is_row, numbers_of
-from .wording import closed, in_ordinary_cases, leading, shown_whole
+from .wording import closed, leading, on_ordinary_draws, shown_whole
 
 NOT_RIGHT = "\nNot right when called as "
 MORE_ACCURATE = ": is a case special there, or is it nearly right everywhere, and accurate enough there alone?"
@@ -30,7 +30,7 @@ class Explanations(Named):
     def _of_some(self, text):
         """What is said of one special draw, as it is true where those of another kind are wrong as well."""
         wrong = {words for m, pair, words in zip(self.metrics, self.pairs, self.words) if words and not m.equal(*pair)}
-        return in_ordinary_cases(text) if len(wrong) > 1 else text
+        return on_ordinary_draws(text) if len(wrong) > 1 else text
 
     def _where_it_is_wrong(self):
         """What the draws on which it is wrong have in common, as one more sentence, where it is right on others."""

@@ -237,7 +237,7 @@ class Numbers(Metric):
         scale = 1.0 if self.absolute else max(self.least, np.abs(expected).max(initial=0.0))
         tol = max(self.tol, FLOAT32_TOLERANCE) if _is_single(result) and not self.double else self.tol
         amount = float(np.abs(result.astype(float) - expected).max(initial=0.0))
-        return [Deviation("the largest entry" if result.ndim else "", amount, self.unit, tol * scale)]
+        return [Deviation("one entry" if result.ndim else "", amount, self.unit, tol * scale)]
 
 
 @dataclass(frozen=True)
@@ -314,7 +314,7 @@ class Rotations(Metric):
         allowed = max(FLOAT32_TOLERANCE if single else 0.0, min(np.deg2rad(self.deg), ORTHONORMAL))
         if skewness > 1e-3 or (np.linalg.det(R) < 0).any() or not _are_rotations(expected):
             entry = float(np.abs(R - expected).max(initial=0.0))
-            return [Deviation("the rotation", entry, "in its largest entry", allowed)]
+            return [Deviation("the rotation", entry, "in one entry", allowed)]
         angle = float(np.rad2deg(np.max(frames.rotation_angle(np.swapaxes(R, -1, -2) @ expected), initial=0.0)))
         tol = max(self.deg, 2e-3) if single else self.deg
         return [Deviation("the rotation", angle, "deg", tol), Deviation("RᵀR - I", skewness, "", max(allowed, 1e-9))]

@@ -769,7 +769,7 @@ class Search:
         words = value_relation(mine, theirs, [dict(zip(self.names, case.args)) for case in self.cases])
         words = words or f"this value is not right{self._of_parts(k, solution)}"
         end = "" if words[-1] in ".?" else "."
-        return f"{self._where(k)}: {words}{end} With the right value there, all that follows is right"
+        return f"{self._where(k)}: {words}{end} With the right value there, what follows is right on every draw tried"
 
     # Right or spoilt on the way
 

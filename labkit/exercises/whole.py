@@ -3,8 +3,8 @@
 Whoever makes an array like one that was given, by `zeros_like` or `copy`, gets one of integers where a student types
 `np.array([3, 0, 4])`, and it cuts decimals off without a word. An answer that stops there says so itself.
 
-The numbers of some draws are made whole, those of all arguments at once, of each alone and of all but one. No table says
-of which that can be asked: something is told only where the answer is right for the same numbers with a decimal point.
+The numbers of some draws are made whole, those of all arguments at once, of each alone and of all but one. No table
+says of which that can be asked: something is told only where the answer is right for the same numbers with a point.
 """
 
 import contextlib

@@ -7,7 +7,7 @@ import numpy as np
 
 SHOWN = 4  # entries of a set or vector that is shown whole
 WHERE = "as long as|where|for|in|on|near|away|without|to"  # what an answer is said to be right of
-RIGHT_WHERE = re.compile(f"^([Rr]ight)(?=, but not | (?!in ordinary )({WHERE}) )")
+RIGHT_WHERE = re.compile(f"^([Rr]ight)(?=, but not | (?!on ordinary )({WHERE}) )")
 NOISY = "exact on clean data, but noise enters otherwise than it should: on noisy data"
 
 
@@ -56,9 +56,9 @@ def leading(words):
     """What an exercise says of the first special draw that fails, as a sentence, those behind it not tried; "" where it
     says nothing of its own.
     """
-    return "" if words in (None, NOISY) else in_ordinary_cases(f"{words[0].upper()}{words[1:].rstrip(':')}.")
+    return "" if words in (None, NOISY) else on_ordinary_draws(f"{words[0].upper()}{words[1:].rstrip(':')}.")
 
 
-def in_ordinary_cases(text):
-    """What is said to be right but for one kind of case, said of ordinary cases alone: other kinds may be wrong too."""
-    return RIGHT_WHERE.sub(r"\1 in ordinary cases", text)
+def on_ordinary_draws(text):
+    """What is said to be right but for one kind of case, said of ordinary draws alone: other kinds may be wrong too."""
+    return RIGHT_WHERE.sub(r"\1 on ordinary draws", text)

@@ -216,7 +216,7 @@ def test_what_is_wrong_for_two_kinds_of_values_is_not_called_right_but_for_one()
         return d / (1.4826 * np.median(d) + 1e-3) <= factor
 
     told = texts("reject_outliers", kept_from_0)
-    assert all(text.startswith("Right in ordinary cases where hardly any values are equal") for text in told)
+    assert all(text.startswith("Right on ordinary draws where hardly any values are equal") for text in told)
 
 
 def test_quartiles_are_no_median_of_distances():

@@ -544,7 +544,7 @@ def test_what_is_told_of_a_wrong_answer(module, id, text, told):
 def test_a_special_case_is_told_before_what_is_wrong_with_the_shape_of_its_result():
     text = "def between_axes(T, apart):\n    return np.squeeze(reference(T, apart))"
     told = told_of(own, "between_axes", text, reference=own.motion.between_axes)
-    assert told.startswith("Right in ordinary cases for several pairs, but not where one pair alone is to be compared")
+    assert told.startswith("Right on ordinary draws for several pairs, but not where one pair alone is to be compared")
 
 
 def test_of_the_notebooks_data_nothing_is_called_right():

@@ -1043,7 +1043,7 @@ def test_the_pole_is_checked_apart():
 
     exercise = CHAPTER["kuka_from_matrix"]
     assert "rounding noise" in exercise.judge(one_by_one).text
-    told = "right in ordinary cases away from the pole, but not at B = 90 deg:"
+    told = "right on ordinary draws away from the pole, but not at B = 90 deg:"
     assert exercise.judge(zero_at_the_pole).text.startswith(told)
 
 
@@ -1311,7 +1311,7 @@ def test_a_set_is_asked_for_as_a_set():
 def test_what_an_exercise_says_of_a_special_draw_leads_where_it_is_refused_or_raises():
     words = "right for long vectors, but not for one entry:"
     item = replace(DOUBLE, noisy=(lambda rng: (rng.normal(size=1),), metrics.Numbers(1e-9), words))
-    said = "Right in ordinary cases for long vectors, but not for one entry"
+    said = "Right on ordinary draws for long vectors, but not for one entry"
     assert item.judge(lambda v: np.squeeze(2 * v)).text.startswith(f"{said}: exp")
     assert f"{said}." in item.judge(lambda v: 2 * v + 0 * v[1]).text
 
@@ -1321,22 +1321,22 @@ def test_right_but_for_one_kind_is_said_of_ordinary_cases_where_another_kind_is_
     item = replace(DOUBLE, noisy=[(lambda rng, v=v: (v,), metric, words) for v, metric, words in kinds])
     one, both = (item.judge(lambda v, n=n: (2 if len(v) <= n else 3) * v).text for n in (6, 5))
     assert one.startswith("right, but not for 7 entries: ")
-    assert both.startswith("right in ordinary cases, but not for 6 entries: ")
-    assert item.judge(lambda v: 2 * v[:5]).text.startswith("Right in ordinary cases, but not for 6 entries: exp")
-    assert "Right in ordinary cases, but not for 6 entries." in item.judge(lambda v: 2 * v + (len(v) > 5 and v[9])).text
+    assert both.startswith("right on ordinary draws, but not for 6 entries: ")
+    assert item.judge(lambda v: 2 * v[:5]).text.startswith("Right on ordinary draws, but not for 6 entries: exp")
+    assert "Right on ordinary draws, but not for 6 entries." in item.judge(lambda v: 2 * v + (len(v) > 5 and v[9])).text
 
 
 @pytest.mark.parametrize(
     "words, told",
     [
-        ("Right as long as all differ. Where", "Right in ordinary cases as long as all differ. Where"),
-        ("right in curves, but not", "right in ordinary cases in curves, but not"),
-        ("right in ordinary cases, but not", "right in ordinary cases, but not"),
+        ("Right as long as all differ. Where", "Right on ordinary draws as long as all differ. Where"),
+        ("right in curves, but not", "right on ordinary draws in curves, but not"),
+        ("right on ordinary draws, but not", "right on ordinary draws, but not"),
         ("exact on clean data, but not", "exact on clean data, but not"),
     ],
 )
-def test_what_is_right_somewhere_is_said_to_be_so_in_ordinary_cases(words, told):
-    assert wording.in_ordinary_cases(words) == told
+def test_what_is_right_somewhere_is_said_to_be_so_on_ordinary_draws(words, told):
+    assert wording.on_ordinary_draws(words) == told
 
 
 def test_a_special_draw_that_is_refused_is_not_told_while_plain_ones_are_wrong():

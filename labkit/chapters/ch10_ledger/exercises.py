@@ -100,7 +100,7 @@ SPECIAL = tuple(
     (
         functools.partial(special_comparison, kind=kind, simulated=simulated, beyond=beyond),
         metrics.Exactly(),
-        f"right in ordinary cases, but not where {words}:",
+        f"right on ordinary draws, but not where {words}:",
     )
     for kind, words in (
         ("sign", "the value has the other sign than the printed number"),

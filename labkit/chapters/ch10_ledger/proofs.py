@@ -205,7 +205,7 @@ BOUND = Exercise(
         (
             functools.partial(special_inputs, kind=kind),
             metrics.Numbers(1e-9, least=0.0 if kind == "fine" else 1.0),
-            f"right in ordinary cases, but not where {words}:",
+            f"right on ordinary draws, but not where {words}:",
         )
         for kind, words in (
             ("whole", "all numbers are whole"),
