@@ -3,8 +3,8 @@
 Whoever makes an array like one that was given, by `zeros_like` or `copy`, gets one of integers where a student types
 `np.array([3, 0, 4])`, and it cuts decimals off without a word. An answer that stops there says so itself.
 
-The numbers of some draws are made whole, those of all arguments at once, of each alone and of all but one. No table
-says of which that can be asked: something is told only where the answer is right for the same numbers with a point.
+The numbers of some draws are made whole, those of all arguments at once and of each alone. No table says of which that
+can be asked: something is told only where the answer is right for the same numbers with a decimal point.
 """
 
 import contextlib
@@ -17,7 +17,7 @@ import numpy as np
 from . import metrics
 from .budget import seconds
 
-TIMES = (1, 3)  # as large are the numbers of the draws that are made whole: of those below 1 all would become 1
+DRAWS = 2  # of which the numbers are made whole
 LARGEST = 2**31  # numbers beyond are left as they are: their products may not fit into an integer
 LONGEST = 0.2  # seconds of processor time for all of them: a slow but right function gets as far as it gets
 SHOWN = 16  # entries of an array that is shown whole
@@ -62,11 +62,11 @@ class WholeNumbers:
 
 def _cases(exercise):
     """(numbers of the arguments made whole, arguments, the same with a decimal point, expected, metric)."""
-    for number, times in enumerate(TIMES if exercise.metric else ()):
+    for number in range(DRAWS if exercise.metric else 0):
         args, _, metric = exercise.plain_again[number]
-        made = [whole(arg, times) for arg in args]
+        made = [whole(arg) for arg in args]
         may = [k for k, new in enumerate(made) if new is not None and exercise.arguments[k] not in exercise.decimals]
-        for changed in _among(may):
+        for changed in [may, *([k] for k in may if len(may) > 1)] if may else []:
             given = tuple(made[k] if k in changed else arg for k, arg in enumerate(args))
             with_point = tuple(_with_point(arg) if k in changed else arg for k, arg in enumerate(given))
             try:
@@ -79,24 +79,18 @@ def _cases(exercise):
                 yield changed, given, with_point, expected, metric
 
 
-def _among(numbers):
-    """All of them, each alone, and all but one of three and more."""
-    pairs = itertools.combinations(numbers, len(numbers) - 1) if len(numbers) > 2 else ()
-    return [list(some) for some in dict.fromkeys([tuple(numbers), *((k,) for k in numbers), *pairs]) if some]
-
-
-def whole(value, times=1):
-    """A number, array, list or tuple in integers, so many times as large, a rotation and that of a pose as quarter
-    turns; None where it holds other things than decimals, or what no integer is.
+def whole(value):
+    """A number, array, list or tuple in integers, a rotation and that of a pose as quarter turns; None where it holds
+    other things than decimals, or what no integer is.
     """
     if isinstance(value, list | tuple):
-        parts = [whole(part, times) for part in value]
+        parts = [whole(part) for part in value]
         return None if not parts or any(part is None for part in parts) else type(value)(parts)
     if not isinstance(value, float | np.ndarray) or np.asarray(value).dtype.kind != "f":
         return None
-    if not np.size(value) or not np.isfinite(value).all() or times * np.abs(value).max() > LARGEST:
+    if not np.size(value) or not np.isfinite(value).all() or np.abs(value).max() > LARGEST:
         return None
-    away = np.copysign(np.ceil(times * np.abs(value)), value).astype(int)  # so that no number becomes 0
+    away = np.copysign(np.ceil(np.abs(value)), value).astype(int)  # so that no number becomes 0
     if not isinstance(value, np.ndarray):
         return int(away)
     if value.ndim > 1 and value.shape[-2:] in ((3, 3), (4, 4)):

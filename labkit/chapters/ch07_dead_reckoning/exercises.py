@@ -145,6 +145,12 @@ def wheels_at_rest(rng):
     return 0.0, 0.0, rng.uniform(0.2, 0.8)
 
 
+def wheels_at_whole_speeds(rng):
+    """Both speeds in integers, one of them odd, so that their mean is none, and the track."""
+    left, right = rng.permutation([2 * rng.integers(-2, 3), 2 * rng.integers(-2, 3) + 1])
+    return int(left), int(right), rng.uniform(0.2, 0.8)
+
+
 def pose_control_step(rng, side=1, gear=1):
     """A pose, a control that turns to this side (1 left, -1 right) in this gear (1 forward, -1 reverse), and a time
     step that tells the models apart.
@@ -1108,6 +1114,12 @@ CHAPTER = Chapter(
                     for left in (True, False)
                 ),
                 (wheels_at_rest, metrics.Numbers(1e-9), "right, but not where both wheels stand still:"),
+                (
+                    wheels_at_whole_speeds,
+                    metrics.Numbers(1e-9),
+                    "right, but not where both speeds are typed as whole numbers, 1 and 2 (is an array made of them, which "
+                    "cuts decimals off?):",
+                ),
                 *(
                     (
                         functools.partial(scaled, draw=two_wheels, factors=factors),
