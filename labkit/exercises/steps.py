@@ -995,7 +995,7 @@ def condition_words(function, draws, missed, budget):
     line, code, *_ = written.places[k]
     once = all(found.get((k, truth), 0) < 2 for found in met)
     where = f"`{code}` (line {line}) was {'false' if truth else 'true'}{'' if once else ' in some round'}"
-    return f"{'exactly' if best[0] == len(draws) - sum(missed) else 'only'} where {where}: look at what happens then"
+    return f"{'exactly' if best[0] == len(draws) - sum(missed) else 'only'} where {where}: perhaps by what happens then"
 
 
 def _may_be_chance(draws, missed, without):

@@ -93,7 +93,7 @@ def test_the_logarithm_of_an_underflown_product_is_refused():
 
     for name, answer in (("beam_weight", beams), ("distance_field_weight", field)):
         outcome = judge(name, answer)
-        assert outcome.status == NOT_YET and "541" in outcome.text
+        assert outcome.status == NOT_YET and "zero in float64" in outcome.text
     assert judge("beam_weight", lambda r, e, s: norm.logpdf(r, e, s).sum()).status == CORRECT
 
 

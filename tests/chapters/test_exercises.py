@@ -43,7 +43,7 @@ def same_answer(item, variant):
 
 @pytest.mark.parametrize("chapter, item", EXERCISES, ids=names(EXERCISES))
 def test_reference_passes_on_many_seeds(chapter, item):
-    for seed in range(3):
+    for seed in range(2):
         outcome = item.judge(same_answer(item, item.reference), rng=np.random.default_rng(seed))
         assert outcome.status == CORRECT, outcome.text
 

@@ -2588,7 +2588,7 @@ CHAPTER = Chapter(
                 (
                     ray_in_a_fine_map,
                     Reach(0.05, "m", absolute=True),
-                    "Right on maps with cells of 10 cm, but not on one with cells of 2 cm and a wall of one cell (is the length of a step typed in? "
+                    "right, but not on a map with cells of 2 cm and a wall of one cell (is the length of a step typed in? "
                     "grid.resolution is the width of a cell):",
                 ),
                 (
@@ -2740,7 +2740,9 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda r, e, s: _log_of_the_product(_normal_log(r - e, s)),
-                    "Right for few beams. With 541 the product is zero before you take its logarithm: sum up logarithms.",
+                    "The product of so many densities, or of a few that are tiny, is zero in float64 before you take its logarithm: "
+                    "sum up logarithms.",
+                    id="beam_weight-9138c6",
                 ),
                 Mistake(
                     lambda r, e, s: float((-0.5 * np.square((r - e) / s)).sum() - np.log(s * math.sqrt(2 * math.pi))),
@@ -2825,7 +2827,9 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _field_plain_product,
-                    "Right for few beams. With 541 the product is zero before you take its logarithm: sum up logarithms.",
+                    "The product of so many densities, or of a few that are tiny, is zero in float64 before you take its logarithm: "
+                    "sum up logarithms.",
+                    id="distance_field_weight-9138c6",
                 ),
                 *_density_mistakes("distance_field_weight", _field_with, "beams"),
                 Mistake(
