@@ -1518,12 +1518,12 @@ CHAPTER = Chapter(
                     (
                         functools.partial(steady_system, n=5, m=3, sure=sure),
                         metrics.Numbers(1e-3),
-                        f"right, but not for five states and noises whose variances are {words}:",
+                        f"right, but not for noises whose variances are {words} (tried with five states):",
                     )
                     for sure, words in (
                         (1e3, "hundreds"),
                         (1e-3, "below a thousandth"),
-                        (1e-8, "below a hundred-millionth, as those of a sensor good to a tenth of a millimeter"),
+                        (1e-8, "some hundred-millionths, as those of a sensor good to a tenth of a millimeter"),
                     )
                 ),
                 (
