@@ -687,6 +687,8 @@ CHAPTER = Chapter(
             noisy=[
                 (functools.partial(fitted_line, twice=True), metrics.Numbers(1e-7),
                  "right, but not where a number stands there twice, with the same row of J: one of the two alone is left out:"),
+                (functools.partial(fitted_line, p=4, freedom=(8, 8)), metrics.Numbers(1e-7),
+                 "right, but not for twelve numbers, as of two rows of six (is each left out alone?):"),
                 *special_fits(fitted_line, metrics.Numbers(1e-7)),
                 *of_other_noise(metrics.Numbers(1e-7, least=0.0)),
             ],
