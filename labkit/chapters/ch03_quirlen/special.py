@@ -98,22 +98,33 @@ def of_whole_numbers(rng):
     return frames.pose(R, rng.integers(-90, 90, (5, 3)).astype(float)), *vectors(rng, [60.0, 250.0])
 
 
-def system(rng, outlier=0.0, **kind):
-    """Stacked matrix and right-hand side, one pose perhaps an outlier."""
+KINDS = (
+    ("of three poses", dict(count=3)),
+    ("of four poses", dict(count=4)),
+    ("of five poses", dict(count=5)),
+    ("of twelve poses", dict(count=12)),
+    ("of forty poses", dict(count=40)),
+    ("of poses turned by more than 90 deg", dict(angle=2.2)),
+)
+
+
+def _one_beside(rng, outlier, **kind):
+    """Poses of which the first is so far beside the others, in mm along each axis."""
     T = poses(rng, **kind)
     T[0, :3, 3] += outlier
+    return T
+
+
+def system(rng, outlier=0.0, **kind):
+    """Stacked matrix and right-hand side, one pose perhaps an outlier."""
+    T = _one_beside(rng, outlier, **kind)
     return pivot.pivot_matrix(T), pivot.pivot_rhs(T)
 
 
 SYSTEMS = tuple(
     (words, functools.partial(system, **kind))
     for words, kind in (
-        ("of three poses", dict(count=3)),
-        ("of four poses", dict(count=4)),
-        ("of five poses", dict(count=5)),
-        ("of twelve poses", dict(count=12)),
-        ("of forty poses", dict(count=40)),
-        ("of poses turned by more than 90 deg", dict(angle=2.2)),
+        *KINDS,
         ("of poses next to the origin", dict(reach=3.0, tip=3.0, std=0.1)),
         ("of poses many meters away", dict(reach=5e4)),
         ("of poses that miss the point by some ten millimeters", dict(std=30.0)),
@@ -124,20 +135,14 @@ SYSTEMS = tuple(
 
 def matrix_and_residuals(rng, std=0.5, outlier=0.0, **kind):
     """Stacked matrix and the residuals of its solution, one pose perhaps an outlier."""
-    T = poses(rng, std=std, **kind)
-    T[0, :3, 3] += outlier
+    T = _one_beside(rng, outlier, std=std, **kind)
     return pivot.pivot_matrix(T), pivot.calibrate_pivot(T).residuals
 
 
 RESIDUALS = tuple(
     (words, functools.partial(matrix_and_residuals, **kind))
     for words, kind in (
-        ("of three poses", dict(count=3)),
-        ("of four poses", dict(count=4)),
-        ("of five poses", dict(count=5)),
-        ("of twelve poses", dict(count=12)),
-        ("of forty poses", dict(count=40)),
-        ("of poses turned by more than 90 deg", dict(angle=2.2)),
+        *KINDS,
         ("of a narrow set of poses", dict(angle=0.06, count=12)),
         ("of residuals of some hundredths of a millimeter", dict(angle=0.06, count=12, std=0.02)),
         ("of residuals of some ten-thousandths of a millimeter", dict(std=2e-4)),

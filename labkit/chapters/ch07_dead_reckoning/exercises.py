@@ -965,7 +965,7 @@ CHAPTER = Chapter(
                     (
                         functools.partial(at_places, robot=(0.5, 0.5), start=(0.4, 0.002), left=left, angle=angle),
                         metrics.Numbers(1e-8, "m"),
-                        "right, but not from a start hardly beside that line: Newton's steps stay on their side of the line "
+                        "right, but not from a start next to the landmarks' line: Newton's steps stay on their side of the line "
                         "through both landmarks (do yours begin at `start`, and nowhere else?):",
                     )
                     for left in (True, False)

@@ -147,7 +147,7 @@ def forgetful_system(rng):
 
 
 def growing_system(rng):
-    """States of which one grows by itself, so slowly that rounding decides in no form of the filter; all are measured."""
+    """States of which one grows by itself, so slowly that rounding has decided none of four forms of the filter; all are measured."""
     A = np.array([[rng.uniform(1.05, 1.15), 0.2], [0.0, rng.uniform(0.5, 0.7)]])
     return A, np.eye(2) + 0.2 * rng.uniform(-1, 1, (2, 2)), covariance(rng, 2, 0.05), covariance(rng, 2, 0.3)
 
