@@ -73,6 +73,16 @@ WITHOUT = {
     ast.Pow: "without one of its powers",
     ast.Mod: "without one of its remainders",
 }
+PARTS = {  # what of an operation is left out with its sign
+    ast.Add: "term",
+    ast.Sub: "term",
+    ast.Mult: "factor",
+    ast.Div: "division by",
+    ast.MatMult: "matrix",
+    ast.Pow: "power",
+    ast.Mod: "remainder by",
+}
+COMMUTE = {ast.Add, ast.Mult, ast.MatMult}  # where either side can be left out alone
 
 
 REDUCTIONS = {"sum", "mean", "median", "std", "var", "prod", "max", "min", "norm", "argmax", "argmin", "any", "all"}
@@ -876,12 +886,9 @@ FIRST_LIKE_SECOND = "with the first case treated like the second"
 DIVISOR = "with a divisor where a quotient belongs"
 IN_DEGREES = "with one value times 180/pi, as from radians to degrees"
 REVERSED = (  # (words of what was changed in a right formula, what is wrong where the change mends)
-    (DIVISOR, "the divisor alone belongs there"),
     (r"with (.+) where (.+) belongs", r"\2 stands where \1 belongs"),
     (r"without one of its (.+)s", r"one \1 is too many"),
     (r"without one side of `(\w+)`", r"one side of `\1` is too many"),
-    (r"without the term `(\w+)` in one place", r"the term `\1` is too many"),
-    (r"without one matrix of a product", "one matrix of the product is too many"),
     (r"without `(\w+)=` in one call", r"`\1=` does not belong there"),
     (r"without `(\w+)`", r"`\1` is too much"),
     (r"without the (second argument of `norm`)", r"the \1 is too many"),
@@ -915,11 +922,21 @@ def _mends(words, node, new):
         return _name_that_mends(words, node, new)
     if _is_of_degrees(node) and isinstance(new, ast.Call | ast.Constant):
         return ""
+    if isinstance(node, ast.BinOp) and (new is node.left or new is node.right):
+        return _left_out(node, new)
     for said, told in REVERSED:
         if re.fullmatch(said, words):
             told = re.sub(said, told, words)
             return re.sub(r"^(two .+|the factors .+|.* and .+|the two .+) is ", r"\1 are ", told)
     return ""
+
+
+def _left_out(node, rest):
+    """That a part of an operation is too many, where the rest of it mends."""
+    kind, alone = type(node.op), f"`{ast.unparse(rest)}` alone belongs there"
+    if rest is node.right:
+        return f"the {PARTS[kind]} `{ast.unparse(node.left)}` is too many" if kind in COMMUTE else alone
+    return f"the {PARTS[kind]} `{ast.unparse(node.right)}` is too many"
 
 
 def _is_of_degrees(node):

@@ -995,7 +995,8 @@ def condition_words(function, draws, missed, budget):
     line, code, *_ = written.places[k]
     once = all(found.get((k, truth), 0) < 2 for found in met)
     where = f"`{code}` (line {line}) was {'false' if truth else 'true'}{'' if once else ' in some round'}"
-    return f"{'exactly' if best[0] == len(draws) - sum(missed) else 'only'} where {where}: perhaps by what happens then"
+    only = "exactly" if best[0] == len(draws) - sum(missed) else "only"
+    return f"{only} where {where}: perhaps by what happens then, perhaps by the condition"
 
 
 def _may_be_chance(draws, missed, without):
