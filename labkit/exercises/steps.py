@@ -41,6 +41,7 @@ SUMMED = re.compile(r"\b(mean|sum|length|reverse)\b")
 COUNT = re.compile(r"^len\([^()]*\)$|\.shape\[-?\d\]$|\.size$")  # of which no half, root or sine is meant
 CHANCE = 1000  # one case of so many may be chance
 BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
+BOUNDING = re.compile(rf"(\w+\.)?({'|'.join(sorted(mutation.BOUNDS))})\(")
 UNBOUNDED = {f"`{name}` is too much" for name in mutation.BOUNDED | mutation.BOUNDS}
 DECIMALS = re.compile(r"[<>]=? *\d*(\.\d+(e[+-]?\d+)?|e-\d+)$|[<>]=? *\d+e-\d+$")  # a comparison with such a number
 NEARER = {  # what brings a result nearer on every draw, and what is said where it is not there yet
@@ -284,7 +285,7 @@ class Search:
         told = self._left_out_instead(plan[1])
         _, line, code, mends = changes[told]
         mends = self._of_truth(mends) + self._if_at_all(told)
-        words = self._whatever_words(line, code, mends) or self._weight_words(line, mends)
+        words = self._whatever_words(line, code, mends) or self._weight_words(line, code, mends)
         return words or f"in line {line}, `{code}`: {mends}. {self._alone()}"
 
     def _of_truth(self, mends):
@@ -313,14 +314,14 @@ class Search:
         truths = (k for k in alike if k in self.written.of_truth)
         return self._turned_words(("value", k, change, None) for k in truths for change in rerun.ALWAYS_THE_SAME)
 
-    def _weight_words(self, line, mends):
-        """What a line binds, where a change of it mends only because that is 1 everywhere then, or as good as 1: with
-        another sign what a bound keeps above 0 is that bound everywhere.
+    def _weight_words(self, line, code, mends):
+        """What a line binds, or a bound keeps, where a change of it mends only because that is 1 everywhere then, or as
+        good as 1: with another sign what a bound keeps above 0 is that bound everywhere.
         """
         if not mends.endswith((TOO_MANY, "is too much", TURNED, OTHER_SIGN)):
             return None
         for k, (at, *_) in enumerate(self.written.places):
-            if at != line or not self._binds(k) or not all(values[k][0] for values in self.values):
+            if at != line or not (self._binds(k) or self._bounds(k, code)) or not all(v[k][0] for v in self.values):
                 continue
             drawn = [values[k][1] for values in self.values]
             among = any(np.ptp(value) for value in drawn)
@@ -712,6 +713,10 @@ class Search:
         """Whether a value is bound to one name there."""
         _, code, name, *_ = self.written.places[k]
         return bool(name) and code.startswith(f"{name} =")
+
+    def _bounds(self, k, code):
+        """Whether this part of the code is kept within a bound there."""
+        return bool(BOUNDING.match(self.written.places[k][1])) and _bare(code) in self.written.places[k][1]
 
     def _could_be(self, pairs):
         """Whether values of the solution can take the place of the student's, and are others where that is wrong."""

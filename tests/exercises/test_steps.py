@@ -970,6 +970,14 @@ def test_a_sign_that_only_leads_to_a_bound_is_told_as_a_weight_that_is_not_neede
     assert f"with 1 everywhere in its place, {steps.RIGHT}, so perhaps it is not needed" in said
 
 
+def test_a_sign_within_a_bound_is_told_as_a_bound_that_is_not_needed():
+    body = "return b[0] * np.diag(np.maximum(1, np.abs(a)))"
+    said = judged(
+        asked(lambda a, b: b[0] * np.eye(len(a)), lambda rng: (rng.uniform(0.3, 3, 3), two_vectors(rng)[1])), body
+    )
+    assert f"`np.maximum(1, np.abs(a))`: with 1 everywhere in its place, {steps.RIGHT}" in said
+
+
 @pytest.mark.parametrize(
     "reference, body, said",
     [

@@ -657,7 +657,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda v: v / np.sqrt(np.linalg.norm(v)),
-                    "You divide by the root of the length. `np.linalg.norm` has taken the root already.",
+                    "You divide by the root of the length. The length itself is the root of the sum of squares: one root is too many.",
                     id="normalize-root-twice",
                 ),
             ],
@@ -829,7 +829,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda o, px, py: frames.frame_from_points(o, px, o + px - py),
-                    "Your y points away from y_point, and takes z to the other side with it: the second edge is y_point - origin.",
+                    "Your y points away from y_point, and takes z to the other side with it: the second edge is y_point - origin, and y that edge minus its part along x.",
                     id="frame-edge-between",
                 ),
                 Mistake(
@@ -1481,11 +1481,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda T: np.array([*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_euler("XYZ")]),
-                    "These are turns about x, then the new y, then the new z. KUKA's order is z, y, x.",
+                    'These are turns about x, then the new y, then the new z. KUKA turns about z first, then about the new y and the new x: in SciPy "ZYX", in capitals.',
+                    id="kuka_from_matrix-b29330",
                 ),
                 Mistake(
                     lambda T: np.array([*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_euler("XYZ")[::-1]]),
-                    "These are turns about x, then the new y, then the new z. KUKA's order is z, y, x.",
+                    'These are turns about x, then the new y, then the new z. KUKA turns about z first, then about the new y and the new x: in SciPy "ZYX", in capitals.',
+                    id="kuka_from_matrix-b29330-2",
                 ),
                 Mistake(
                     lambda T: np.array([*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_rotvec()]),

@@ -945,7 +945,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: 15.245,
-                    "Worse than any of the six axes, and still not the worst direction: try more of them.",
+                    "Worse than any of the six axes, and still not the worst direction: try more of them, on all sides.",
                     id="meter-few-directions",
                     within=0.28,
                 ),

@@ -743,7 +743,7 @@ def _slope_there(x):
     if np.abs(bends).max() < FLAT:
         return "There f is nearly flat, far out on the plain, where the gradient fades and vanishes nowhere: start between the wells"
     if bends.min() > 0 and slope < NEXT_TO * bends.min():
-        return "There the gradient vanishes, or nearly so, and f bends up in all directions: that is a minimum"
+        return "That is a minimum, or within a hundredth of one: f bends up there in all directions"
     near = np.linalg.norm(x - wells.extrema()[2].x) < WITHIN_REACH
     further = ", and one is near: a few of Newton's steps from there end in it" if near else ""
     return f"There the gradient is {slope:.3g} long. At a saddle it vanishes{further}"
@@ -2126,7 +2126,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     beyond.loop(keep=lambda rho: rho > 0),
-                    "You take every step that lowers the cost. The rule asks for more: ρ > 0.1.",
+                    "You also take steps that lower the cost by little. The rule asks for more: ρ > 0.1.",
                     id="region-any-decrease",
                 ),
                 Mistake(
