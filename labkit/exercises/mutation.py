@@ -1004,6 +1004,8 @@ def _operation(node, names):
             yield 1, _without(kind, node.right, names), node.left
         if kind not in (ast.Pow, ast.Mod) and not (bare and isinstance(node.right, ast.Constant)):
             yield 1, DIVISOR if kind is ast.Div else _without(kind, node.left, names), node.right
+        if kind is ast.Sub and not any(isinstance(part, ast.Constant) for part in (node.left, node.right)):
+            yield 1, _without(kind, node.left, names), ast.UnaryOp(ast.USub(), node.right)
     if kind is ast.MatMult and isinstance(node.left, ast.BinOp) and isinstance(node.left.op, ast.MatMult):
         a, b, c = node.left.left, node.left.right, node.right
         for one, two, three in ((a, c, b), (b, c, a), (c, a, b), (c, b, a)):

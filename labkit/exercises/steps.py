@@ -355,8 +355,8 @@ class Search:
     def _left_out_instead(self, number):
         """What says more than a change that mends only because it makes a part do nothing: that a case is never to be
         met, or always, where what it asks, in its line or before it, is changed otherwise than to a finer bound, or the
-        sign of what it does; that a part is too many, where it has another sign or name or is made finer, or the larger
-        one it stands in; that nothing is to be bounded, where another bound is set.
+        sign of what it does; that a part is too many, where it has another sign, name or order or is made finer, or the
+        larger one it stands in; that nothing is to be bounded, where another bound is set.
         """
         changes = self.written.changes
         line, code, mends = changes[number][1:]
@@ -371,7 +371,8 @@ class Search:
         less = [k for k, text, words in at_line if text == code and TOO_MANY in words]
         less += [k for k, words in larger if TOO_MANY in words and not finer]
         less += [k for k, text, words in at_line if words.startswith(mutation.STACKED) and _bare(code) in _bare(text)]
-        plan = self.mending([("code", k) for k in case + (less if finer or " stands where " in mends else [])])
+        replaced = finer or " stands where " in mends or mends.endswith(" exchanged")
+        plan = self.mending([("code", k) for k in case + (less if replaced else [])])
         return number if plan is None else plan[1]
 
     # Values on the way turned into others
