@@ -450,7 +450,7 @@ ACCURACY = [
             ),
             Mistake(
                 lambda command, reached: np.linalg.norm(reached.mean() - command),
-                "`reached.mean()` averages over the coordinates as well. Write `reached.mean(axis=0)`.",
+                "A mean without an axis averages over the coordinates as well. Write `reached.mean(axis=0)`.",
                 id="accuracy-axis",
             ),
             Mistake(
@@ -1130,7 +1130,7 @@ LITERATURE = [
             ),
             Mistake(
                 lambda A, B: (_rows(A) - _rows(B), _moved(A)),
-                "These are the equations of A X = B X, as (2-43) prints it. (2-44) and the appendix have A X = X B.",
+                "This D is that of A X = B X, as (2-43) prints it. (2-44) and the appendix have A X = X B.",
                 id="kim-as-printed-left",
             ),
             Mistake(
@@ -1140,7 +1140,7 @@ LITERATURE = [
             ),
             Mistake(
                 _kim(_rows, lambda B: np.kron(np.eye(3), B), _moved),
-                "B enters transposed: row i of X B is Bᵀ times row i of X, so the blocks on the diagonal hold Bᵀ.",
+                "Bᵀ belongs where your D holds B: row i of X B is Bᵀ times row i of X.",
                 id="kim-untransposed",
             ),
             Mistake(

@@ -177,7 +177,7 @@ STOPS = [
             ),
             Mistake(
                 lambda q: np.linalg.eigh(q.T @ q)[1][:, 0],
-                "This eigenvector belongs to the smallest eigenvalue: what the readings have least of. `eigh` sorts upward.",
+                "This belongs to the smallest eigenvalue: what the readings have least of. `eigh` sorts upward, `svd` downward.",
                 id="mean_quaternion-smallest",
             ),
             Mistake(

@@ -886,7 +886,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _moved_last,
-                    "d goes along the old z, before the turn by alpha. You moved after both turns.",
+                    "d goes along the old z, before the turn by alpha. Yours goes along the new one.",
+                    id="dh_matrix-48a360",
                 ),
                 Mistake(_entry_by_entry, "`*` multiplies entry by entry. The product of two transforms is `@`."),
                 Mistake(_without(1), "d is missing: the last column is (a cos theta, a sin theta, d)."),
@@ -1189,7 +1190,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda M: lie.nearest_rotation(_signed(_null(M, 0).reshape(3, 3, order="F"))),
-                    "This belongs to the largest singular value. NumPy sorts them from large to small: take the last row of Vt.",
+                    "This belongs to the largest singular value. `svd` has the smallest last (the last row of Vt), `eigh` first (the first column).",
+                    id="rotation_from_nullvector-230478",
                 ),
                 Mistake(
                     lambda M: lie.nearest_rotation(_signed(np.linalg.eigh(M.T @ M)[1][0].reshape(3, 3, order="F"))),
@@ -1268,7 +1270,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda M: _values(M)[1] / _values(M)[0],
-                    "This is the second largest. NumPy sorts them from large to small: `[-2]`.",
+                    "This is the second largest. `svd` sorts from large to small, so that `[-2]` is the second smallest; `eigvalsh` from small to large.",
                     id="singular_value_ratio-second-largest",
                 ),
                 *(
@@ -1351,7 +1353,8 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     _translation(lambda A: -_k1(A), _k2),
-                    "The result has the opposite sign: (I - R_A) t = t_A - R t_B, not (R_A - I) t.",
+                    "The result has the opposite sign: (I - R_A) t = t_A - R t_B.",
+                    id="translation_lsq-0db086",
                 ),
                 Mistake(
                     _translation(_k1, lambda A, B, R: A[:, :3, 3] - B[:, :3, 3]),

@@ -642,7 +642,7 @@ def _arc_y_sign(x, u, dt):
     return np.array([x[0] + r * (np.sin(after) - np.sin(x[2])), x[1] + r * (np.cos(after) - np.cos(x[2])), after])
 
 
-GENTLE = "right in sharp curves, but not in gentle ones, where omega is 0.1 rad/s or less:"
+GENTLE = "right in sharp curves, but not in gentle ones, where omega is {:g} rad/s or less:"
 LONG = "right, but not for a turn that goes more than once around, omega T beyond 2 pi:"
 HALF_AROUND = "right, but not for a turn by more than half a circle in one step, omega T beyond pi, which is to be halved as it is:"
 ROUNDED_WHEELS = 1.1e-16  # rad/s: wheels at 0.3 and at 0.1 + 0.2 m/s turn the robot so fast, on paper
@@ -1310,7 +1310,7 @@ CHAPTER = Chapter(
             metric=metrics.PlanarPoses(1e-7),  # thousands of short steps are right as well
             noisy=(
                 *(
-                    (functools.partial(gentle_curve, omega=omega), metrics.PlanarPoses(1e-6), GENTLE)
+                    (functools.partial(gentle_curve, omega=omega), metrics.PlanarPoses(1e-6), GENTLE.format(omega))
                     for omega in (0.1, 0.01, 1e-3, 1e-4)
                 ),
                 (functools.partial(long_turn, by=(6.8, 11)), metrics.PlanarPoses(1e-3), LONG),
