@@ -60,11 +60,16 @@ class Explanations(Named):
         reference = self.exercise.reference
         if self._is_always_the_same() or self._holds_no_number() or self._one_truth():
             return None
-        if all(isinstance(expected, str | bool | set | frozenset) for _, expected in self.pairs):
-            tried = (pair for pair in tried if not arguments.SIZES.search(pair[0]))  # another size would do as well
-        told = ((words, change) for words, change in tried if self._is_felt(change))
+        told = ((words, change) for words, change in self._of_no_size(tried) if self._is_felt(change))
         words = self._first_that_fits((words, lambda *args, c=change: reference(*c(args))) for words, change in told)
         return words and f"your result is what comes out {words}"
+
+    def _of_no_size(self, tried):
+        """Of (words, function) those that change no size, where words, truth values or sets are expected: another size
+        would do as well.
+        """
+        sized = not all(isinstance(expected, str | bool | set | frozenset) for _, expected in self.pairs)
+        return (pair for pair in tried if sized or not arguments.SIZES.search(pair[0]))
 
     def _is_felt(self, change):
         """Whether a change of arguments leaves them as they are where the answer is right, if that is about numbers."""
@@ -102,13 +107,19 @@ class Explanations(Named):
         """Whether a variant gives the student's results on fresh draws as well."""
         mistake, draws = Mistake(function, ""), self._fresh_results
         wrong = sum(not metric.equal(*pair) for _, metric, pair in self._cases() + draws)
-        if self._is_choice() and wrong < TELLING:
+        if self._is_choice() and wrong < TELLING or self._is_one_truth_nearly():
             return False
         try:
             with guard.time_limit(self.budget.left()):
                 return self._is_it_again(mistake) and all(self._is_mistake(mistake, *draw) for draw in draws)
         except guard.TimeLimit:
             return False
+
+    def _is_one_truth_nearly(self):
+        """Whether of truth values one came out on hardly any draw, so that many a rule would give them."""
+        results = [pair[0] for *_, pair in self._cases() + self._fresh_results]
+        truths = all(type(result) is bool for result in results)
+        return truths and min(map(results.count, (True, False))) < TELLING
 
     def _terms(self):
         """What one argument, or a number of them, has to do with each part of the results that is wrong."""
@@ -151,7 +162,7 @@ class Explanations(Named):
             return None
         if self._holds_no_number() or self._never_said() or self._one_truth():
             return None
-        words = self._first_that_fits(slips.changed_formulas(self.exercise))
+        words = self._first_that_fits(self._of_no_size(slips.changed_formulas(self.exercise)))
         return words and f"your result is what a right formula gives {words}"
 
     def _picked(self):

@@ -170,8 +170,11 @@ def changes(function, most=4):
     """
     found, names, indices = [], _names(function), set(_indices(function))
     places = {node.slice for node in ast.walk(function) if isinstance(node, ast.Subscript)}
+    limits = set(_typed_limits(function))
     for node, put in _parts(function):
         for rank, words, new in _changed(node, names):
+            if node in limits and isinstance(new, ast.Constant) and new.value not in (-1, 0, 1):
+                continue  # with any number that is far enough out the limit does nothing
             rank += node in places and rank == 1  # T[3, :3] is 0 in each pose: a term left out says more
             if rank <= most:
                 words = COUNTED if node in indices and words == "with one sign turned" else words
@@ -180,6 +183,15 @@ def changes(function, most=4):
     if most:
         found += _statements(function)
     return sorted(found, key=lambda change: change.rank)
+
+
+def _typed_limits(function):
+    """Numbers that are typed in as limits of something."""
+    for node in ast.walk(function):
+        if isinstance(node, ast.Call) and _called(node) in {*BOUNDS, "clip"}:
+            for limit in (getattr(argument, "operand", argument) for argument in node.args):
+                if isinstance(limit, ast.Constant):
+                    yield limit
 
 
 def _counted_by_loops(function):
@@ -1093,13 +1105,15 @@ def _call(node, names):
 
 
 def _what_is_called_upon(node, name, names):
-    """What is left of a call without it: its first argument, or the value of which it is a method, as a text is; None
-    for a value that is rounded, which is not often what is wrong.
+    """What is left of a call without it: its first argument, of a limit what is no typed number, or the value of which
+    it is a method, as a text is; None for a value that is rounded, which is not often what is wrong.
     """
     owner = getattr(node.func, "value", None)
     is_value = _root(owner) in {*names[0], *names[1]} or isinstance(owner, ast.Call | ast.Subscript | ast.BinOp)
     if is_value and node.args and name in ROUNDING:
         return None
+    if name in BOUNDS and len(node.args) == 2 and _number(node.args[0]) is not None:
+        return node.args[1]
     of_the_owner = is_value and name not in APPLIED or name == CAST
     return node.args[0] if node.args and not of_the_owner else owner
 
@@ -1163,8 +1177,8 @@ def _constant(node, names):
     if isinstance(value, bool):
         yield 2, f"with {not value} where {value} belongs", ast.Constant(not value)
     elif isinstance(value, int | float):
-        nought = (0,) if isinstance(value, float) and 0 < abs(value) <= ADDED else ()  # a bound that is to be 0
-        for other in dict.fromkeys((value + 1, value - 1, -value, value / 2, 2 * value, *nought)):
+        tiny = isinstance(value, float) and 0 < abs(value) <= ADDED  # a bound that is to be 0, and is none of about 1
+        for other in dict.fromkeys((*((0,) if tiny else (value + 1, value - 1)), -value, value / 2, 2 * value)):
             if other != value:
                 whole = int(other) if isinstance(value, int) and other == int(other) else other
                 yield 2, f"with {whole} where {value} belongs", ast.Constant(whole)

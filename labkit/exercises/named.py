@@ -10,7 +10,7 @@ from . import budget, guard, metrics, rerun
 from .budget import Budget
 from .evidence import MORE_CASES, Evidence
 from .outcome import NOT_YET
-from .results import Refusal, admitted_by, equal_as_written, failure_of
+from .results import Refusal, admitted_by, are_one, equal_as_written, failure_of
 
 FEW = 3  # draws on which two rules may well give the same, where they are right on the others
 ONCE_MORE = 5  # plain draws on which a mistake is to show as well: those of one check may all be of one kind by chance
@@ -120,11 +120,15 @@ class Named(Evidence):
 
     def _named_elsewhere(self):
         """The text of the mistake that an answer is wherever it is wrong, where it is right on other draws; None where
-        it is none on all of them, or where one of several is to be chosen, so that two rules may decide alike.
+        it is none on all of them, or where all that is wrong is one of several to choose, so that two rules may agree.
         """
-        if self.refusal or isinstance(self.exercise.metric, metrics.Exactly):
+        if self.refusal:
             return None
         draws = [(args, m, pair) for args, m, pair in self._cases() + self._fresh_results if not m.equal(*pair)]
+        parts = (part for _, m, pair in draws for part in m.parts(*pair))
+        chosen = all(isinstance(part, metrics.Exactly) or part.equal(*pair) for _, part, *pair in parts)
+        if chosen or are_one([result for *_, (result, _) in draws]):
+            return None  # also of one and the same number, as where one text alone is wrong
         for mistake in self.exercise.mistakes if len(draws) > 1 else ():
             if all(self._is_mistake(mistake, *draw) for draw in draws):
                 return mistake.text

@@ -1105,6 +1105,7 @@ def several(rng):
             "in line 2, `3.14`: 3.14 and 6.28 are rounded: np.pi has all the digits.",
         ),
         (lambda a, b: b - a, "return np.maximum(b - a, 1 / len(b))", "/ len(b))`: `maximum` is too much"),
+        (lambda a, b: np.exp(a), "return np.exp(np.minimum(2, a))", "`np.minimum(2, a)`: `minimum` is too much"),
         (lambda a, b: np.maximum(b, 0) + a, "return np.maximum(b, 1e-3) + a", "`1e-3`: 0.001 stands where 0 belongs"),
         (
             lambda a, b: np.outer(b, b) @ a,

@@ -199,7 +199,7 @@ def landmark_at(rng, within):
 def near_and_far(metric):
     return [
         (functools.partial(landmark_at, within=within), metric, f"right, but not for a landmark {where}:")
-        for within, where in (((0.1, 0.2), "closer by than a meter"), ((300, 900), "20 m away or more"))
+        for within, where in (((0.1, 0.2), "a decimeter or two away"), ((300, 900), "hundreds of meters away"))
     ]
 
 
@@ -1522,8 +1522,8 @@ CHAPTER = Chapter(
                     )
                     for sure, words in (
                         (1e3, "hundreds"),
-                        (1e-3, "below a thousandth"),
-                        (1e-8, "some hundred-millionths, as those of a sensor good to a tenth of a millimeter"),
+                        (1e-3, "some thousandths at most"),
+                        (1e-8, "some hundred-millionths at most, as those of a sensor good to a tenth of a millimeter"),
                     )
                 ),
                 (
@@ -1814,7 +1814,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a: a % (2 * np.pi) - np.pi,
-                    "The first shift is missing: add pi before the remainder. Yours points backward.",
+                    "Yours points backward: it is off by pi, as where pi is not added before the remainder.",
+                    id="wrap_angle-c921e6",
                 ),
                 Mistake(
                     lambda a: (a - np.pi) % (2 * np.pi) + np.pi,
@@ -1825,7 +1826,9 @@ CHAPTER = Chapter(
                     "Take off full turns, 2 pi. Half a turn more or less points backward.",
                 ),
                 Mistake(
-                    lambda a: np.arctan2(np.cos(a), np.sin(a)), "np.arctan2 takes the sine first, then the cosine."
+                    lambda a: np.arctan2(np.cos(a), np.sin(a)),
+                    "This is pi/2 less the angle, as where np.arctan2 gets the cosine first: it takes the sine first.",
+                    id="wrap_angle-fca799",
                 ),
                 Mistake(
                     lambda a: np.arcsin(np.sin(a)),
@@ -2536,7 +2539,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _nees_of(lambda true, found: wrapped(true) - wrapped(found)),
-                    "You wrapped each heading. 179 deg and -179 deg are still 358 deg apart then: wrap their difference.",
+                    "With each heading between -pi and pi, 179 deg and -179 deg are still 358 deg apart: wrap their difference.",
+                    id="nees-786433",
                 ),
                 Mistake(
                     lambda t, x, P: float(wrapped(t - x) @ np.linalg.solve(P, wrapped(t - x))),

@@ -1302,20 +1302,26 @@ def _from_the_sum_of_squares(weights):
 
 
 def _draws(resample, weights, rng, runs):
-    """Share of the draws that each index gets over several runs; refuses what are no M valid indices."""
-    total = np.zeros(len(weights))
+    """Share of the draws that each index gets over several runs; in words what are no M valid indices."""
+    counts = _counts(resample, weights, rng, runs)
+    return counts if isinstance(counts, str) else counts.sum(0) / counts.sum()
+
+
+def _counts(resample, weights, rng, runs):
+    """How often each index comes out in each of several runs, shape (runs, M); in words what are no M valid indices."""
+    counts, m = [], len(weights)
     for _ in range(runs):
         drawn = resample(weights.copy(), rng)
         if type(drawn) is tuple:
             return "expected an array of indices, got a tuple, which `states[...]` takes for one place, not for many"
         index = np.asarray(drawn)
-        if index.shape != (len(weights),) or index.dtype.kind not in "iu":
-            return f"expected {len(weights)} whole numbers, got shape {index.shape} of {index.dtype}"
-        if index.min() < 0 or index.max() >= len(weights):
+        if index.shape != (m,) or index.dtype.kind not in "iu":
+            return f"expected {m} whole numbers, got shape {index.shape} of {index.dtype}"
+        if index.min() < 0 or index.max() >= m:
             wrong = index.min() if index.min() < 0 else index.max()
-            return f"an index {wrong} came out of {len(weights)} particles, which count from 0 to {len(weights) - 1}"
-        total += np.bincount(index, minlength=len(weights))
-    return total / total.sum()
+            return f"an index {wrong} came out of {m} particles, which count from 0 to {m - 1}"
+        counts.append(np.bincount(index, minlength=m))
+    return np.array(counts)
 
 
 def _listens(draw, lead=""):
@@ -1509,16 +1515,14 @@ EACH_SPIN = "each spin must reach over the whole wheel, and none may depend on a
 
 
 def _spins_are_independent(resample, rng):
-    weights = np.full(10, 0.1)
-    counts = np.array([np.bincount(resample(weights.copy(), rng), minlength=10) for _ in range(600)])
+    counts = _counts(resample, np.full(10, 0.1), rng, 600)
+    if isinstance(counts, str):
+        return f"with 10 equal weights: {counts}."
     variance = float(counts.var(0).mean())
     if variance < 0.9 - VARIES:
         return f"a count varies by {variance:.2f} instead of 0.9 (variance of a binomial): {EACH_SPIN}."
     if variance > 0.9 + VARIES:
-        return (
-            f"some spins go together: a count varies by {variance:.2f} instead of 0.9 (variance of a binomial). Each spin needs "
-            "a random number of its own."
-        )
+        return f"some spins go together: a count varies by {variance:.2f} instead of 0.9 (variance of a binomial): {EACH_SPIN}."
     half = float(counts[:, :5].sum(1).var())
     if half < HALF_VARIES:
         return (
@@ -1530,8 +1534,10 @@ def _spins_are_independent(resample, rng):
 
 def _spokes_are_even(resample, rng):
     weights = np.array([0.05, 0.3, 0.15, 0.22, 0.28])
-    for _ in range(200):
-        counts = np.bincount(resample(weights.copy(), rng), minlength=5)
+    found = _counts(resample, weights, rng, 200)
+    if isinstance(found, str):
+        return f"with the weights {weights.tolist()}: {found}."
+    for counts in found:
         off = np.abs(counts - 5 * weights)
         if off.max() >= 1 + 1e-9:
             k = int(np.argmax(off))
@@ -1645,7 +1651,7 @@ def _noise_is_right(move, rng):
     theta, u = rng.uniform(1.2, 1.9) * rng.choice([-1, 1]), np.array([1.0, 0.0])
     states, place = np.tile([0.0, 0.0, theta], (4000, 1)), rng.uniform(-5, 5, 2)
     states[:, :2] = place
-    std_u, dt = np.round(rng.uniform((0.08, 0.22), (0.15, 0.3)), 2), float(np.round(rng.uniform(0.3, 0.5), 2))
+    std_u, dt = np.round(rng.uniform((0.1, 0.22), (0.14, 0.29)), 2), float(np.round(rng.uniform(0.3, 0.5), 2))
     if told := _reckons(move, states[:2], u.tolist(), dt, rng):
         return told
     moved = np.asarray(move(states.copy(), u, dt, std_u, rng))
@@ -1702,11 +1708,12 @@ def _other_spread(name, noise, wanted, std_u, dt, longer):
     if name != "aside" and abs(amount - dt * math.sqrt(std)) < 0.05 * amount:
         return f"{told}. That is what the root of std_u gives: std_u holds standard deviations, not variances."
     other, of_the_other = (std_u[0], "v") if name == "in theta" else (std_u[1], "omega")
-    twice_the_variance = abs(other - math.sqrt(2) * std) < 0.1 * other
-    if name != "aside" and not twice_the_variance and abs(amount - dt * other) < 0.05 * amount:
+    if name != "aside" and abs(amount - dt * other) < 0.05 * amount:
         return f"{told}. That is what the standard deviation of {of_the_other} gives: each speed has its own."
     if abs(amount - wanted * math.sqrt(dt)) < 0.05 * amount and abs(longer / amount - 2**1.5) < 0.2:
         return f"{told}. It grows with dt to the power 1.5: std_u is that of the control in one step, whatever dt is."
+    if name != "aside" and abs(amount * math.sqrt(dt) - wanted) < 0.05 * wanted and abs(longer / amount - 2**0.5) < 0.2:
+        return f"{told}. It grows with the root of dt: std_u is that of the control in one step, whatever dt is."
     if abs(amount / math.sqrt(2) - wanted) < 0.05 * wanted:
         tails = _kurtosis(noise) > LONG_TAILS
         twice = (
@@ -2313,14 +2320,16 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _landmarks(back=True),
-                    "You looked from the landmark to the robot: the difference is landmark - position.",
+                    "Your expected bearings are the opposite ones, as from the landmark to the robot: the difference is landmark - position.",
+                    id="landmark_weight-c281fb",
                 ),
                 Mistake(_landmarks(parts=(1, 0)), "The bearings are missing: both densities are multiplied."),
                 Mistake(_landmarks(parts=(0, 1)), "The ranges are missing: both densities are multiplied."),
                 *_density_mistakes("landmark_weight", _landmarks, "readings"),
                 Mistake(
                     _landmark_plain_product,
-                    "Right near the robot. Far from it the product is zero before you take its logarithm: add logarithms.",
+                    "Where a pose is far off the product is zero in float64 before you take its logarithm: add logarithms.",
+                    id="landmark_weight-5cca7f",
                 ),
                 Mistake(
                     _ranges_wrapped,
@@ -3092,7 +3101,11 @@ CHAPTER = Chapter(
                     lambda w: np.square(w).sum() / w.sum() ** 2,
                     "This is the reciprocal: it is 1/M for equal weights, not M.",
                 ),
-                Mistake(lambda w: float(len(w)), "You counted the particles. Count what their weights are worth."),
+                Mistake(
+                    lambda w: float(len(w)),
+                    "This is how many particles there are. Count what their weights are worth.",
+                    id="effective_size-3a1bd2",
+                ),
                 Mistake(
                     lambda w: len(w) / (1 + np.var(w)),
                     "That formula holds for weights of mean 1: divide by their mean first.",
