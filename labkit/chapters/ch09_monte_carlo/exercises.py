@@ -1710,10 +1710,8 @@ def _other_spread(name, noise, wanted, std_u, dt, longer):
     other, of_the_other = (std_u[0], "v") if name == "in theta" else (std_u[1], "omega")
     if name != "aside" and abs(amount - dt * other) < 0.05 * amount:
         return f"{told}. That is what the standard deviation of {of_the_other} gives: each speed has its own."
-    if abs(amount - wanted * math.sqrt(dt)) < 0.05 * amount and abs(longer / amount - 2**1.5) < 0.2:
-        return f"{told}. It grows with dt to the power 1.5: std_u is that of the control in one step, whatever dt is."
-    if name != "aside" and abs(amount * math.sqrt(dt) - wanted) < 0.05 * wanted and abs(longer / amount - 2**0.5) < 0.2:
-        return f"{told}. It grows with the root of dt: std_u is that of the control in one step, whatever dt is."
+    if power := _power_of_dt(amount / wanted, longer / amount, dt) if name != "aside" else "":
+        return f"{told}. It grows with {power}: std_u is that of the control in one step, whatever dt is."
     if abs(amount / math.sqrt(2) - wanted) < 0.05 * wanted:
         tails = _kurtosis(noise) > LONG_TAILS
         twice = (
@@ -1723,6 +1721,15 @@ def _other_spread(name, noise, wanted, std_u, dt, longer):
     if name == "aside":
         return f"{told}. {BENDS}"
     return f"{told}."
+
+
+def _power_of_dt(times, longer, dt):
+    """With what a spread grows that is so many times the right one, and `longer` times as large after twice the time."""
+    powers = ((1.5, "dt to the power 1.5"), (0.5, "the root of dt"))
+    fits = (
+        words for power, words in powers if abs(times * dt ** (1 - power) - 1) < 0.05 and abs(longer - 2**power) < 0.2
+    )
+    return next(fits, "")
 
 
 LONG_TAILS = 4.5  # a kurtosis that 4000 normal numbers do not reach
