@@ -342,7 +342,8 @@ class Poses(Metric):
         right = np.isclose(last, (0, 0, 0, 1), atol=1e-6).all(axis=1)
         if not right.all():
             row = last[np.argmin(right)]
-            raise Refused(f"the last row must be 0 0 0 1, got {' '.join(f'{v + 0.0:.3g}' for v in row)}")
+            told = (" ".join(f"{v + 0.0:.{digits}g}" for v in row) for digits in (3, 9))
+            raise Refused(f"the last row must be 0 0 0 1, got {next(words for words in told if words != '0 0 0 1')}")
         return result
 
     def deviations(self, result, expected):

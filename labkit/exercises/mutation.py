@@ -88,7 +88,8 @@ COMMUTE = {ast.Add, ast.Mult, ast.MatMult}  # where either side can be left out 
 REDUCTIONS = {"sum", "mean", "median", "std", "var", "prod", "max", "min", "norm", "argmax", "argmin", "any", "all"}
 COARSE, FINE = 1e-6, 1e-6  # from which on a bound or a step of differences may be too large, and what part of it is not
 FINER = -1  # the rank of what is made finer: few changes, tried by themselves, before others make loops without an end
-TINY, LONGER = 1e-6, 1000  # up to which a step of differences may be too short, and how many times as long is not
+TINY, LONGER, MILD = 1e-6, (1e3, 1e6), 1e-5  # up to which a step of differences may be too short, how many times as
+# long is not, and how long at most
 ADDED = 0.01  # up to which a number that is added may be there to keep a divisor from 0
 ITERATION = 20  # rounds of a loop that goes on until nothing changes, and not through what is given
 ROUNDS = 400  # of a loop, or ten times as many as it has: enough for what converges
@@ -712,24 +713,29 @@ def _finer_differences(function):
 
 
 def _longer_steps(function):
-    """Tiny steps of differences made a thousand times as long, wherever they stand: rounding is divided by them."""
+    """Tiny steps of differences made a thousand or a million times as long, wherever they stand: rounding is divided by
+    them.
+    """
     tiny = [found for found in _typed(function) if type(found[-1].value) is float and 0 < found[-1].value <= TINY]
-    for number in sorted({node.value for *_, node in tiny}):
+    for number, times in itertools.product(sorted({node.value for *_, node in tiny}), LONGER):
         alike = [found for found in tiny if found[-1].value == number]
-        if not _is_step(function, {node for *_, node in alike}):
+        longer = float(f"{times * number:g}")
+        if times > LONGER[0] and longer > MILD or not _is_step(function, {node for *_, node in alike}):
             continue
         group = []
         for owner, field, content, i, node in alike:
-            new = ast.copy_location(ast.Constant(LONGER * number), node)
+            new = ast.copy_location(ast.Constant(longer), node)
             whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
             group.append(Change("", "", FINER, node, ((owner, field, whole),)))
         if sets := group[0].sets if len(group) == 1 else _together(group):
-            mends = f"rounding shows where a step is as short as this: {LONGER * number:g} will do"
+            mends = f"rounding shows where a step is as short as this: {longer:g} will do"
             yield Change("", mends, FINER, group[0].place, sets)
 
 
 def _is_step(function, numbers):
-    """Whether numbers that are typed in, or a name bound to them, are added somewhere and divide without a sum."""
+    """Whether numbers that are typed in, or a name bound to them, divide without a sum, and whether they, or what is
+    made of them, are added somewhere.
+    """
     bound = set()
     for step in (node for node in ast.walk(function) if isinstance(node, ast.Assign)):
         target, value = step.targets[0], step.value
@@ -737,13 +743,28 @@ def _is_step(function, numbers):
         pairs = zip(target.elts, value.elts) if both else [(target, value)]
         bound |= {to.id for to, of in pairs if of in numbers and isinstance(to, ast.Name)}
 
-    def holds(part):
-        return any(node in numbers or getattr(node, "id", None) in bound for node in ast.walk(part))
+    def holds(part, names=bound):
+        return any(node in numbers or getattr(node, "id", None) in names for node in ast.walk(part))
 
+    made = set(bound)
+    for to, of in _bindings(function):
+        made |= {n.id for n in ast.walk(to) if isinstance(n, ast.Name)} if holds(of, made) else set()
     sums = [n for n in ast.walk(function) if isinstance(n, ast.BinOp | ast.AugAssign) and _adds(n)]
     divisors = [n.right for n in ast.walk(function) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Div)]
     divisors += [n.value for n in ast.walk(function) if isinstance(n, ast.AugAssign) and isinstance(n.op, ast.Div)]
-    return any(map(holds, sums)) and any(holds(d) and not any(map(_adds, ast.walk(d))) for d in divisors)
+    return any(holds(n, made) for n in sums) and any(holds(d) and not any(map(_adds, ast.walk(d))) for d in divisors)
+
+
+def _bindings(function):
+    """(what is bound, to what) by steps, loops and comprehensions, line by line."""
+    found = []
+    for node in ast.walk(function):
+        if isinstance(node, ast.Assign):
+            to = node.targets[0]
+            found.append((to.value if isinstance(to, ast.Subscript) else to, node.value))
+        if isinstance(node, ast.For | ast.comprehension):
+            found.append((node.target, node.iter))
+    return sorted(found, key=lambda pair: pair[0].lineno)
 
 
 def _adds(node):
@@ -895,6 +916,7 @@ AFRESH = "with a list or array that each round finds as it was"
 COUNTED = "with one index counted from the other end"
 SECOND_LIKE_FIRST = "with the second case treated like the first"
 FIRST_LIKE_SECOND = "with the first case treated like the second"
+ONE_ROUND = "the loop is to take one round only"
 DIVISOR = "with a divisor where a quotient belongs"
 IN_DEGREES = "with one value times 180/pi, as from radians to degrees"
 REVERSED = (  # (words of what was changed in a right formula, what is wrong where the change mends)
@@ -923,7 +945,7 @@ REVERSED = (  # (words of what was changed in a right formula, what is wrong whe
         "an array made of this is one of integers, and cuts off decimals",
     ),
     (WHOLE, "`dtype=float` is missing: an array made of whole numbers alone cuts off decimals"),
-    (r"with one round of its loop", "the loop is to take one round only"),
+    (r"with one round of its loop", ONE_ROUND),
     (r"with one case (never|always) taken", r"this case is to be \1 taken"),
 )
 
@@ -1274,7 +1296,7 @@ def _instead(statement):
         yield "with `break` where `continue` belongs", mends, [ast.Break()]
     if isinstance(statement, ast.For):
         once = [*statement.body, ast.Break()]
-        mends = "the loop is to take one round only"
+        mends = ONE_ROUND
         yield "with one round of its loop", mends, [ast.For(statement.target, statement.iter, once, [], None)]
     if isinstance(statement, ast.If):
         for words, test in (("never", False), ("always", True)):

@@ -545,7 +545,10 @@ class Search:
     @_or_nothing
     def partly_words(self):
         """A change of the code that leaves a simple difference, or makes a part of the result right on all draws."""
-        plans = [("code", k) for k, (rank, *_) in enumerate(self.written.changes) if 0 <= rank < WORTH]
+        worth = (k for k, (rank, *_) in enumerate(self.written.changes) if 0 <= rank < WORTH)
+        plans = [
+            ("code", k) for k in worth if self.written.changes[k][-1] != mutation.ONE_ROUND
+        ]  # of all it is no part
         best, right = None, [case.parts_before() for case in self.cases]
         if None in right:
             return None

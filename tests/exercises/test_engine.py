@@ -374,6 +374,7 @@ def moved(T, R=None, t=None):
         (lambda T: moved(T, R=np.eye(3)), "if `T` did not turn"),
         (lambda T: T.T.copy(), "with `T` transposed"),
         (lambda T: T - 0.5, "last row must be 0 0 0 1"),
+        (lambda T: 1.0001 * T, "last row must be 0 0 0 1, got 0 0 0 1.0001"),
         (lambda T: T[:3], "expected an array of shape (4, 4)"),
         (lambda T: frames.pose(T[:3, :3] @ frames.matrix_from_kuka([0, 0, 0, 0.1, 0, 0])[:3, :3], T[:3, 3] + 1), "deg"),
     ],

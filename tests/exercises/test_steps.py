@@ -819,6 +819,10 @@ def test_a_number_that_cancels_is_not_what_belongs():
             "in line 2, `1e-11`: rounding shows where a step",
         ),
         (
+            "h = 1e-12\nfor e in h * np.eye(1)[0]:\n    s = (np.sin(a + e) - np.sin(a - e)) / (2 * h)\nreturn s",
+            "in line 2, `1e-12`: rounding shows where a step is as short as this: 1e-06 will do",
+        ),
+        (
             "return (np.sin(a + 1e-13) - np.sin(a)) / 1e-13",
             "with 1e-10 in its place the result comes nearer on every draw",
         ),

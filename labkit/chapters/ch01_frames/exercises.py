@@ -1308,7 +1308,7 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         _never_negative(3 + k, sine),
-                        f"Your {word} of {angle} is never negative, as a root of 1 less a square is: take np.{word[:3]}.",
+                        f"Your {word} of {angle} is never negative, as a root of 1 less a square is: take np.{word[:3]} of the angle as it comes.",
                         id=f"kuka-positive-{word}-{angle}",
                     )
                     for k, angle in enumerate("ABC")
@@ -1378,7 +1378,8 @@ CHAPTER = Chapter(
                 Mistake(
                     _angles_one_by_one,
                     "Right except at the pole: there r10, r00, r21, r22 are rounding noise, and A and C, read one by one, do not fit "
-                    "each other. Take A first, undo it, and read C from what is left.",
+                    "each other. Take A first, undo it, and read C from the middle row of what is left.",
+                    id="kuka_from_matrix-760252",
                 ),
                 Mistake(
                     _arcsine_of_too_much,

@@ -769,7 +769,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _closure(lambda T: np.linalg.norm(T[:3, :3] - np.eye(3)) / np.sqrt(2)),
-                    "|R - I| / sqrt(2) is twice the sine of half the angle: the angle itself for small turns only.",
+                    "This is twice the sine of half the angle, as |R - I| / sqrt(2) is: the angle itself for small turns only.",
                     id="closure-chord",
                 ),
                 Mistake(

@@ -144,6 +144,14 @@ def _rows_overlap(T_WF):
     return A
 
 
+def _entries_overlap(T_WF):
+    """Position i begins in entry i, where it should begin in entry 3i."""
+    b = np.zeros(3 * len(T_WF))
+    for i, T in enumerate(T_WF):
+        b[i : i + 3] = -T[:3, 3]
+    return b
+
+
 def _tip_alone(A, b):
     """The pivot forgotten: R tip = -p."""
     return np.concatenate([np.linalg.lstsq(A[:, :3], b, rcond=None)[0], np.zeros(3)])
@@ -378,6 +386,11 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda T: -(T[:, :3, 3] - T[:, :3, 3].mean(0)).ravel(),
                     "You took the mean off the positions. That suits a fit without the pivot; here the pivot is one of the unknowns.",
+                ),
+                Mistake(
+                    _entries_overlap,
+                    "The positions overwrite each other: each pose takes three entries, so those of pose i begin at 3 * i.",
+                    id="pivot_rhs-overlap",
                 ),
                 Mistake(
                     lambda T: -T[:3, 3].ravel(),

@@ -2446,7 +2446,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: 1 + beyond.tipping_weight(),
-                    "One too many: w replaces the weight 1 of the printed sum, it is not added to it.",
+                    "One too many. Is w added to the weight 1 of the printed sum, which it replaces? Or are the sphere's points, 9 + 8 + 6, left out?",
                     id="tipping-plus-one",
                 ),
                 Mistake(
