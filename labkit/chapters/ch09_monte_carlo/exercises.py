@@ -711,11 +711,12 @@ def _of_the_density(x, std):
 ROUNDED_TO_ZERO = (
     (
         _of_the_density,
-        "Right but for large errors: there the density is zero in float64, and the logarithm of 0 is -inf. Write down the logarithm's own formula.",
+        "Where errors are large the density, or a product of some, is zero in float64, and the logarithm of 0 is -inf. Write down the logarithm's own formula.",
+        "7652a1",
     ),
     (
         _lifted,
-        "Right but for large errors: there the density is zero in float64, and what you put in its place decides. Write down the logarithm's own formula.",
+        "Where errors are large the density is zero in float64, and what you put in its place decides. Write down the logarithm's own formula.",
         "02d19b",
     ),
 )
