@@ -1125,7 +1125,7 @@ CHAPTER = Chapter(
                 Mistake(_kuka_in_flange, "These are the residuals along the axes of F, as if the target were brought into the flange. (4-3) brings the sphere into B.", id="kuka_residual-in-flange"),
                 Mistake(_kuka_in_scanner, "These are the residuals along the axes of S, as if the target were brought into the scanner. (4-3) brings the sphere into B.", id="kuka_residual-in-scanner"),
                 Mistake(_kuka_angles("XYZ"), "You turned by A about x and by C about z. KUKA: A about z, then B about y, then C about x."),
-                Mistake(_kuka_angles("zyx"), "You turned about fixed axes. A, B, C turn about axes that move along: Rz(A) Ry(B) Rx(C)."),
+                Mistake(_kuka_angles("zyx"), "This is Rx(C) Ry(B) Rz(A), as for turns about fixed axes. A, B, C turn about axes that move along: Rz(A) Ry(B) Rx(C).", id="kuka_residual-23be1c"),
                 Mistake(_kuka_without_target, "The target is missing: these are positions of the sphere in the base, not residuals."),
                 Mistake(_kuka_scanner_first, "The order is T_FS T_BF: the letters do not cancel. From S to F, then from F to B: T_BF T_FS."),
                 Mistake(_kuka_inverse, "You used the inverse of T_FS: p2 is the scanner in the flange frame, it maps S to F."),

@@ -551,14 +551,14 @@ STATIONS = [
                 for low, high, words in (
                     (0, 0, "straight ahead"),
                     (1e-4, 5e-3, "nearly straight ahead, by thousandths of a radian"),
-                    (1.2, 1.45, "far aside, by 70 deg and more"),
+                    (1.23, 1.45, "far aside, by 70 deg and more"),
                 )
             ),
             *(
                 (functools.partial(scaled, draw=two_delays, factors=(1 / factor, factor)), metrics.Numbers(1e-9), words)
                 for factor, words in (
                     (20, "right, but not for fast planes, 800 turns a second and more:"),
-                    (0.01, "right, but not for slow planes, a turn or less a second:"),
+                    (0.01, "right, but not for slow planes, about a turn a second or less:"),
                 )
             ),
         ),
@@ -662,7 +662,7 @@ STATIONS = [
                     f"right, but not for {words}:",
                 )
                 for factors, words in (
-                    ((100, 1e3), "stations that stand 100 m apart and directions of a length of hundreds"),
+                    ((100, 1e3), "stations that stand hundreds of meters apart and directions of a length of hundreds"),
                     ((0.01, 1e-3), "stations that stand centimeters apart and directions of a length of thousandths"),
                 )
             ),
