@@ -1991,7 +1991,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: _loop(noise_time=1.0)[1],
-                    "The control's covariance is that of a step of 1 s. `drive.dt` is 0.1 s, there as well.",
+                    "The control's covariance is that of a step of 1 s, as it is too when multiplied by `drive.dt`. Make it for `drive.dt`, 0.1 s, and take it as it is.",
+                    id="end_cov-2116a0",
                 ),
                 *(
                     Mistake(functools.partial(_exchanged, *names), f"{' and '.join(names)} have changed places.")
