@@ -33,9 +33,15 @@ class Named(Evidence):
         return None
 
     def _is_it_once_more(self, mistake):
-        """Whether an answer is equal to a mistake on some fresh plain draws, where plain draws come out wrong."""
-        if self.exercise.metric is None or self._right_on_plain():
+        """Whether an answer is equal to a mistake on some fresh plain draws, where plain draws come out wrong; else on
+        fresh special ones where that is wrong, as on one draw two rules may fail alike by chance.
+        """
+        if self.exercise.metric is None:
             return True
+        if self._right_on_plain():
+            special = range(MORE_CASES, MORE_CASES + 2 * len(self.exercise.noisy))
+            cases = (self.exercise.all_again[number] for number in special)
+            return self._is_it_on(mistake, (case for case in cases if self._is_wrong_on(mistake, *case)))
         return self._is_it_on(mistake, (self.exercise.plain_again[number] for number in range(ONCE_MORE)))
 
     def _is_it_again(self, mistake):

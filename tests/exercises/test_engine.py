@@ -1,6 +1,7 @@
 # ruff: noqa: NPY002, SIM105, SIM223 (hostile student code, on purpose)
 """The engine survives any student code and says what is wrong with it."""
 
+import copy
 import itertools
 import json
 import math
@@ -1350,3 +1351,19 @@ def test_a_message_keeps_its_blanks_and_loses_its_lines():
     assert (
         guard.message_of(ValueError("got '1.5   2.5'\n   of three  \n\nnumbers")) == "got '1.5   2.5' of three numbers"
     )
+
+
+def test_a_mistake_at_a_special_place_is_named_if_it_shows_at_others_of_that_kind_too():
+    below = (lambda rng: (-float(rng.integers(1, 3)),), metrics.Numbers(1e-9), "right, but not below 0:")
+    exercise = Exercise(
+        "same",
+        reference=lambda x: x,
+        draw=lambda rng: (rng.uniform(1, 2),),
+        metric=metrics.Numbers(1e-9),
+        hints=("a", "b", "c"),
+        noisy=(below, below, below, below),
+        mistakes=(Mistake(abs, "No absolute value."),),
+    )
+    checks = [np.random.default_rng(seed) for seed in range(40)]
+    assert {exercise.judge(lambda x: abs(x), rng).text for rng in copy.deepcopy(checks)} == {"No absolute value."}
+    assert not any("No absolute" in exercise.judge(lambda x: x if x > 0 else 1.0, rng).text for rng in checks)
