@@ -314,10 +314,6 @@ SPECIAL_RESIDUALS = (
         functools.partial(residuals_with_outliers, size=1e3),
         "right, but not where most residuals are longer than 100 mm:",
     ),
-    (
-        residuals_of_all_lengths,
-        "right, but not where residuals of all lengths are there, up to the cutoff and past it:",
-    ),
 )
 
 
@@ -1451,7 +1447,7 @@ CHAPTER = Chapter(
         Exercise(
             "robust_weights",
             reference=robust_weights,
-            draw=(residuals_with_outliers, functools.partial(residuals_with_outliers, odd=1)),
+            draw=(residuals_with_outliers, functools.partial(residuals_with_outliers, odd=1), residuals_of_all_lengths),
             metric=metrics.Numbers(1e-3),  # the printed 1.538 is good enough
             noisy=tuple((draw, metrics.Numbers(1e-3), words) for draw, words in SPECIAL_RESIDUALS),
             hints=(
