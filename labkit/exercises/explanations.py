@@ -111,7 +111,7 @@ class Explanations(Named):
             return False
         try:
             with guard.time_limit(self.budget.left()):
-                return self._is_it_again(mistake) and all(self._is_mistake(mistake, *draw) for draw in draws)
+                return all(self._is_mistake(mistake, *draw) for draw in draws) and self._is_it_again(mistake)
         except guard.TimeLimit:
             return False
 

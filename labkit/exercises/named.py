@@ -6,18 +6,16 @@ import re
 
 import numpy as np
 
-from . import budget, guard, metrics, rerun
+from . import budget, guard, metrics
 from .budget import Budget
 from .evidence import MORE_CASES, Evidence
 from .outcome import NOT_YET
 from .results import Refusal, admitted_by, are_one, equal_as_written, failure_of
 
-FEW = 3  # draws on which two rules may well give the same, where they are right on the others
-ONCE_MORE = 5  # plain draws on which a mistake is to show as well: those of one check may all be of one kind by chance
 BESIDE = re.compile(
     r"The [a-z ]+ (?:is|are) right(\. |; |, but )"
 )  # said of the other results, where one alone is wrong
-MORE_DRAWS = 30  # on which an answer that is right on some draws only is tried, to tell on which
+MORE_DRAWS = 30  # on which a mistake is to show as well, and an answer is tried that is right on some draws only
 
 
 class Named(Evidence):
@@ -28,47 +26,24 @@ class Named(Evidence):
         cases = self._cases()
         for k, mistake in enumerate(self.exercise.mistakes):
             alike = all(self._is_mistake(mistake, *case) for case in cases)
-            if alike and self._is_it_again(mistake) and self._is_it_once_more(mistake):
+            if alike and self._is_it_again(mistake):
                 return self.outcome(NOT_YET, mistake.text, k)
         return None
 
-    def _is_it_once_more(self, mistake):
-        """Whether an answer is equal to a mistake on some fresh plain draws, where plain draws come out wrong; else on
-        fresh special ones where that is wrong, as on one draw two rules may fail alike by chance.
+    def _is_it_again(self, mistake):
+        """Whether an answer is equal to a mistake on fresh draws too, as those of one check may all be of one kind and
+        two rules decide alike by chance: on plain ones, or on special ones where that is wrong if those alone are off.
         """
-        if self.exercise.metric is None:
+        exercise = self.exercise
+        if exercise.metric is None:
             return True
         if self._right_on_plain():
-            special = range(MORE_CASES, MORE_CASES + 2 * len(self.exercise.noisy))
-            cases = (self.exercise.all_again[number] for number in special)
+            special = range(MORE_CASES, MORE_CASES + 2 * len(exercise.noisy))
+            cases = (exercise.all_again[number] for number in special)
             return self._is_it_on(mistake, (case for case in cases if self._is_wrong_on(mistake, *case)))
-        return self._is_it_on(mistake, (self.exercise.plain_again[number] for number in range(ONCE_MORE)))
-
-    def _is_it_again(self, mistake):
-        """Whether an answer is equal to a mistake on fresh draws too, where it is one of several, some of them, a truth
-        value, or an argument as it came, or is wrong on a few draws alone: two rules may decide alike by chance.
-        """
-        chosen = isinstance(self.exercise.metric, metrics.Exactly) or self._is_given()
-        decides = chosen or self._is_seldom_wrong()
-        if not decides or self.refusal or self._right_on_plain():
-            return True
-        if isinstance(self.pairs[0][1], str):
+        if not self.refusal and isinstance(self.pairs[0][1], str):
             return self._shows_always(mistake)
-        return self._is_it_on(mistake, (self.exercise.plain_again[number] for number in range(MORE_DRAWS)))
-
-    def _is_given(self):
-        """Whether all that is wrong on plain draws is one argument, as a search gives that has found nothing."""
-        metric = self.exercise.metric
-        wrong = [] if metric is None else [(a, p[0]) for a, m, p in self._cases() if not m.equal(*p)]
-        return any(
-            all(np.array_equal(rerun.numeric(result), rerun.numeric(args[k])) for args, result in wrong)
-            for k in range(len(wrong[0][0]) if wrong else 0)
-        )
-
-    def _is_seldom_wrong(self):
-        metric = self.exercise.metric
-        wrong = [] if metric is None else [pair for pair in self._plain_pairs() if not metric.equal(*pair)]
-        return 0 < len(wrong) <= FEW and self._right_somewhere()
+        return self._is_it_on(mistake, (exercise.plain_again[number] for number in range(MORE_DRAWS)))
 
     def _shows_always(self, mistake):
         """Whether an answer is a mistake's wherever that is wrong, at special places too: one of a few words may be the

@@ -1367,3 +1367,27 @@ def test_a_mistake_at_a_special_place_is_named_if_it_shows_at_others_of_that_kin
     checks = [np.random.default_rng(seed) for seed in range(40)]
     assert {exercise.judge(lambda x: abs(x), rng).text for rng in copy.deepcopy(checks)} == {"No absolute value."}
     assert not any("No absolute" in exercise.judge(lambda x: x if x > 0 else 1.0, rng).text for rng in checks)
+
+
+def test_a_mistake_is_named_if_it_shows_on_draws_that_this_check_had_not():
+    def draw(rng):
+        return (rng.uniform(1, 2, int(rng.integers(3, 8))),)
+
+    exercise = Exercise(
+        "total",
+        reference=np.sum,
+        draw=draw,
+        metric=metrics.Numbers(1e-9),
+        hints=("a", "b", "c"),
+        mistakes=(Mistake(lambda x: x[:3].sum(), "You added the first three."),),
+        draws=1,
+    )
+
+    def by_threes(x):
+        return sum(x[k : k + 3].sum() for k in range(0, len(x) - 2, 3))
+
+    checks = [np.random.default_rng(seed) for seed in range(8)]
+    assert {exercise.judge(lambda x: sum(x[:3]), rng).text for rng in copy.deepcopy(checks)} >= {
+        "You added the first three."
+    }
+    assert not any("first three" in exercise.judge(by_threes, rng).text for rng in checks)
