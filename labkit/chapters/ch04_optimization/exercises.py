@@ -2404,7 +2404,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: beyond.tipping_weight(criteria=(2,)),
-                    "That is where both draw level if taking the data, the third criterion, is weighted. Solving is the last one.",
+                    "At 3 both draw level if taking the data, the third criterion, is weighted. Asked for is the weight of solving, the last one, and not rounded.",
                     id="tipping-third",
                 ),
                 *(

@@ -741,7 +741,7 @@ class named_entries(metrics.Exactly):
             words = f"{missed} of {len(expected)} misprints {'is' if missed == 1 else 'are'} not named yet{here} {words} an entry, but not the misprinted one"
             return [metrics.Deviation("", float(missed), "", 0.5, words=words)]
         if missed and result and not accused:
-            words = f"{missed} of {len(expected)} misprints {'is' if missed == 1 else 'are'} not named yet, in rows of which you name no entry; what you name is misprinted"
+            words = f"{missed} of {len(expected)} misprints {'is' if missed == 1 else 'are'} not named yet, in rows of which you name no entry; of this table, what you name is misprinted"
             words += HIDDEN if 2 * missed > len(expected) else ""
             return [metrics.Deviation("", float(missed), "", 0.5, words=words)]
         rows = Counter((table, pose) for table, pose, _ in result)

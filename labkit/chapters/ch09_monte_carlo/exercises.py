@@ -3021,13 +3021,15 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda w, rng: np.searchsorted(np.cumsum(w), (rng.random() + np.arange(len(w)) / len(w)) * w.sum()),
-                    "You turn the wheel by up to W. One gap is enough, up to W / M: (rng.random() + np.arange(M)) / M.",
+                    "You turn the wheel by up to W. One gap is enough, up to W / M: W (rng.random() + np.arange(M)) / M.",
+                    id="resample_systematic-5930c6",
                 ),
                 Mistake(
                     lambda w, rng: np.minimum(
                         np.searchsorted(np.cumsum(w), (rng.random() + np.arange(len(w)) / len(w)) * w.sum()), len(w) - 1
                     ),
-                    "You turn the wheel by up to W. One gap is enough, up to W / M: (rng.random() + np.arange(M)) / M.",
+                    "You turn the wheel by up to W. One gap is enough, up to W / M: W (rng.random() + np.arange(M)) / M.",
+                    id="resample_systematic-5930c6-2",
                 ),
                 *(
                     Mistake(

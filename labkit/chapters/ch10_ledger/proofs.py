@@ -1144,7 +1144,8 @@ SUSPECTS = Exercise(
         ),
         Mistake(
             lambda entries, average: set() if _agree(entries, average) else set(range(len(entries) + 1)),
-            "You accuse everybody. Wanted are those of whom one slip makes entries and average agree.",
+            "You accuse everybody, or nearly. Wanted are those of whom one slip makes entries and average agree.",
+            id="suspects-1b0ac7",
         ),
         *(
             Mistake(

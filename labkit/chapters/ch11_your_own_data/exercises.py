@@ -715,7 +715,7 @@ CHAPTER = Chapter(
                 *(Mistake(functools.partial(_without_several, count=count), f"You leave out {words}. Here each number is left out alone.")
                   for count, words in ((3, "three numbers at once, as those of one position"), (6, "six numbers at once, as those of one pose"), (2, "two numbers at once"))),
                 Mistake(lambda r, J: r - _shares(J), "You subtracted h, a share without unit, from a residual. What is left of an error is 1 - h of it: divide by that."),
-                Mistake(lambda r, J: r * (1 + _shares(J)), "1 + h is only the beginning of 1 / (1 - h): right for small shares."),
+                Mistake(lambda r, J: r * (1 + _shares(J)), "1 + h is only the beginning of 1 / (1 - h): near it for small shares.", id="left_out-25a0de"),
                 Mistake(lambda r, J: r / (1 - _shares(J)) ** 2, "You divided by 1 - h twice."),
                 Mistake(lambda r, J: r - left_out(r, J), "This is what the fit to the others gives at each number. Asked for is what is left of the number: r less it."),
                 Mistake(lambda r, J: 2 * r - left_out(r, J), "The fit to the others is right, its sign is not: their fit is subtracted from the number, not added to it."),
