@@ -114,7 +114,7 @@ def fitted_line(
     if twice:
         J[-1], noise[-1] = J[0], noise[0]
     if unlike:
-        J *= 10.0 ** rng.permutation(np.linspace(-1.7, 1.7, p))
+        J *= 10.0 ** rng.permutation(np.linspace(-2.2, 2.2, p))
     if alone:
         k = int(rng.integers(n))
         others = np.delete(J, k, axis=0)
