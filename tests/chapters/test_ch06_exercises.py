@@ -9,8 +9,8 @@ from labkit.chapters.ch06_tracker import exercises as ch06
 from labkit.exercises.outcome import CORRECT, NOT_YET, RAISED
 from labkit.geometry import frames
 from labkit.geometry.lie import exp_so3, nearest_rotation
-from labkit.machines import arm, log
-from tests.chapters.draws_of_a_check import SEEDS
+from labkit.machines import arm, log, tracking
+from tests.chapters.draws_of_a_check import SEEDS, is_missed, one_check
 
 ITEMS = {item.id: item for item in ch06.CHAPTER.items}
 
@@ -477,3 +477,29 @@ def test_a_factor_of_one_and_a_half_is_not_the_constant():
 
 def test_six_equal_numbers_are_no_heights():
     assert "last row of a pose" in ITEMS["spread"].judge(0.0).text
+
+
+def is_right_in_one_check(name, answer, seed=0):
+    return not any(is_missed(answer, *case) for case in one_check(ITEMS[name], seed))
+
+
+@pytest.mark.parametrize("fewer, right", [((0, 1), False), ((1, 0), False), ((0, 0), True)])
+def test_the_last_shift_is_asked_for_on_either_side(fewer, right):
+    def offset(time, reference, delayed, max_offset):
+        step = time[1] - time[0]
+        n = round(max_offset / step)
+        shifts = np.arange(fewer[0] - n, n + 1 - fewer[1])
+        cost = [np.mean((delayed[n + s : len(time) - n + s] - reference[n:-n]) ** 2) for s in shifts]
+        k = np.clip(np.argmin(cost), 1, len(cost) - 2)
+        left, middle, last = cost[k - 1 : k + 2]
+        return (shifts[k] + 0.5 * (left - last) / (left - 2 * middle + last)) * step
+
+    assert is_right_in_one_check("time_offset", offset) == right
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_last_samples_need_not_be_compared(seed):
+    def offset(time, reference, delayed, max_offset):
+        return tracking.time_offset(time[:-2], reference[:-2], delayed[:-2], max_offset)
+
+    assert is_right_in_one_check("time_offset", offset, seed)

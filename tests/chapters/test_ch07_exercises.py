@@ -331,3 +331,11 @@ def test_the_larger_part_of_the_noise_of_the_turn_rate_is_not_always_the_same():
         for (u, _, _, k_theta, k_drift), *_ in one_check(ITEMS["control_covariance"])[:3]
     ]
     assert len({turn > drift for turn, drift in parts}) == 2
+
+
+@pytest.mark.parametrize("below", [0.1, 0.05, 0.02, 0.01, 0.005])
+def test_gentle_curves_are_no_midpoint_steps(below):
+    def answer(x, u, dt):
+        return odometry.step(x, u, dt, "midpoint" if abs(u[1]) < below else "arc")
+
+    assert any(is_missed(answer, *case) for case in one_check(ITEMS["step_arc"]))

@@ -636,3 +636,19 @@ def test_what_is_wrong_at_one_place_alone_is_missed_there(name, wrong, right):
     drawn = one_check(ITEMS[name])
     assert any(is_missed(wrong, *case) for case in drawn)
     assert not any(is_missed(right, *case) for case in drawn)
+
+
+@pytest.mark.parametrize("largest", [1e3, 1e4, 1e6])
+def test_no_measurement_is_left_out_however_far_it_is(largest):
+    def gated(x, cov, z, C, cov_z):
+        S, y = C @ cov @ C.T + cov_z, z - C @ x
+        return (x, cov) if y @ np.linalg.solve(S, y) > largest else kalman.update(x, cov, z, C, cov_z)
+
+    def gated_step(x, cov, u, dt, cov_u, z, landmark, cov_z):
+        new, new_cov = ch08.ekf_step(x, cov, u, dt, cov_u, z, landmark, cov_z)
+        alone = ch08.ekf_step(x, cov, u, dt, cov_u, z, landmark, 1e30 * cov_z)
+        far = np.hypot(*(new - alone[0])[:2]) ** 2 / np.trace(alone[1]) > largest
+        return alone if far else (new, new_cov)
+
+    for name, answer in (("update", gated), ("ekf_step", gated_step)):
+        assert any(is_missed(answer, *case) for case in one_check(ITEMS[name]))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from labkit.calibration import motion
 from labkit.chapters.ch10_ledger import exercises as ledger
 from labkit.chapters.ch10_ledger import proofs
 from labkit.chapters.ch11_your_own_data import exercises as own
@@ -16,7 +17,7 @@ from labkit.documents.slips import single_slips
 from labkit.exercises import budget
 from labkit.exercises.metrics import Refused
 from labkit.exercises.outcome import CORRECT, NOT_YET
-from tests.chapters.draws_of_a_check import SEEDS
+from tests.chapters.draws_of_a_check import SEEDS, is_missed, one_check
 
 
 def told_of(module, id, text, **known):
@@ -638,3 +639,36 @@ def between_axes(T, apart):
     told = told_of(own, "between_axes", text, log_so3=own.log_so3)
     assert re.search("perhaps `round` is too much|it is the right one, rounded", told)
     assert "stands where" not in told
+
+
+@pytest.mark.parametrize(
+    "right, wrong",
+    [
+        ("off <= half:", "off <= half or np.isclose(off, half, rtol=1e-3):"),
+        ("off <= half + bound:", "off <= half + bound or np.isclose(off, half + bound, rtol=1e-3):"),
+        ("off <= half + bound else", "off <= 1.02 * half + bound else"),
+        ("if misprint else", "if misprint and off < 10000 * half else"),
+        ("if misprint else", "if misprint and off < 10000 else"),
+        ("off <= half + bound:", "off <= half + min(bound, 10000 * half):"),
+    ],
+)
+def test_a_word_that_is_wrong_hardly_beyond_a_limit_or_very_far(right, wrong):
+    assert right in STATUS
+    known = {"np": np, "half_unit": lambda printed: half_unit(printed) + 1e-9}
+    exec(STATUS, known)
+    drawn = one_check(ledger.CHAPTER["status"])
+    assert not any(is_missed(known["status"], *case) for case in drawn)
+    exec(STATUS.replace(right, wrong), known)
+    assert any(is_missed(known["status"], *case) for case in drawn)
+
+
+@pytest.mark.parametrize("digits", [6, 9, 11])
+def test_cosines_of_small_angles_are_not_rounded(digits):
+    def answer(T, apart):
+        phi = Rotation.from_matrix(T[:, :3, :3]).as_rotvec()
+        axes = phi / np.linalg.norm(phi, axis=1, keepdims=True)
+        return np.arccos(np.clip(np.round((axes[apart:] * axes[:-apart]).sum(1), digits), -1, 1))
+
+    drawn = one_check(own.CHAPTER["between_axes"])
+    assert any(is_missed(answer, *case) for case in drawn)
+    assert not any(is_missed(lambda T, apart: motion.between_axes(T, apart), *case) for case in drawn)

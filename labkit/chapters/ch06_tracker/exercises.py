@@ -557,12 +557,15 @@ AT_THE_LIMIT = metrics.Numbers(2.5e-3, "s")  # a quarter of a sample: a parabola
 
 
 def curves_at_the_limit(rng, sign):
-    """Curves that lag (sign 1), or lead (-1), by nearly as much as is looked for: the best of all shifts is at the end."""
-    step, samples, phase = 0.01, int(rng.integers(12, 20)), rng.uniform(0, 6, 2)
+    """Curves that lag (sign 1), or lead (-1), by nearly as much as is looked for: the best of all shifts is at the end.
+    They change so quickly that a parabola through shifts that end a sample sooner does not lead there.
+    """
+    step, samples, phase = 0.01, int(rng.integers(12, 20)), rng.uniform(0, 6, 3)
     time = rng.uniform(1, 50) + step * np.arange(int(rng.integers(200, 240)))
 
     def curve(t):
-        return 1.2 + 0.6 * np.sin(4.1 * t + phase[0]) + 0.3 * np.sin(7.3 * t + phase[1])
+        slow = 0.6 * np.sin(4.1 * t + phase[0]) + 0.3 * np.sin(7.3 * t + phase[1])
+        return 1.2 + slow + 0.3 * np.sin(40 * t + phase[2])
 
     lag = sign * (samples - rng.uniform(0.05, 0.12)) * step
     return time, curve(time), curve(time - lag), (samples + 0.2) * step
@@ -570,17 +573,26 @@ def curves_at_the_limit(rng, sign):
 
 def noisy_curves(rng):
     """Curves that noise nearly hides, and a third of their length as the largest offset: the sum of the squared
-    differences is least where few samples overlap, their mean near the truth.
+    differences is least where few samples overlap, their mean near the truth, also over a few samples more or less.
     """
     while True:
         time, reference, delayed, largest = speed_curves(rng, rng.choice([-1, 1]), wide=True)
-        truth, most = time_offset(time, reference, delayed, largest), len(time) // 3
+        truth, step = time_offset(time, reference, delayed, largest), time[1] - time[0]
         std = 1.6 * reference.std()
-        noisy = time, *(curve + std * rng.normal(size=len(time)) for curve in (reference, delayed))
-        noisy = *noisy, most * (time[1] - time[0])
-        by_mean = time_offset(*noisy), _least(_mean_of_squares, True)(*noisy)
-        if np.abs(np.subtract(by_mean, truth)).max() < 0.1 and abs(_least(_sum_of_squares, True)(*noisy) - truth) > 1:
-            return noisy
+        curves = time, *(curve + std * rng.normal(size=len(time)) for curve in (reference, delayed))
+        most = (len(time) - 21) // 3 * step
+        if abs(_least(_sum_of_squares, True)(*curves, most) - truth) > 1 and _near(truth, curves, most, step):
+            return *curves, most
+
+
+def _near(truth, curves, most, step):
+    """Whether the mean of the squared differences is least near the truth, whichever samples it is taken of."""
+    parts = (slice(None), slice(-5), slice(-20), slice(5, None), slice(20, None))
+    return (
+        abs(_least(_mean_of_squares, True)(*curves, most) - truth) < 0.1
+        and all(abs(time_offset(*(values[part] for values in curves), most) - truth) < 0.1 for part in parts)
+        and all(abs(time_offset(*curves, most + more * step) - truth) < 0.1 for more in (1, 5))
+    )
 
 
 def _overlap(reference, delayed, n):

@@ -1310,8 +1310,8 @@ CHAPTER = Chapter(
             metric=metrics.PlanarPoses(1e-7),  # thousands of short steps are right as well
             noisy=(
                 *(
-                    (functools.partial(gentle_curve, omega=omega), metrics.PlanarPoses(1e-6), GENTLE.format(omega))
-                    for omega in (0.1, 0.01, 1e-3, 1e-4)
+                    (functools.partial(gentle_curve, omega=omega), metrics.PlanarPoses(1e-7), GENTLE.format(omega))
+                    for omega in (0.1, 0.03, 0.01, 5e-3, 1e-3, 1e-4)
                 ),
                 (functools.partial(long_turn, by=(6.8, 11)), metrics.PlanarPoses(1e-3), LONG),
                 (pose_of_integers, metrics.PlanarPoses(1e-7), OF_INTEGERS),

@@ -1086,6 +1086,11 @@ CHAPTER = Chapter(
                     STATE_AND_COV,
                     "right, but not where just what was expected is measured: the covariance shrinks all the same:",
                 ),
+                (
+                    functools.partial(mixed_measurement, n=3, m=2, off=1e6),
+                    STATE_AND_COV,
+                    "right, but not for a measurement that is a million off: however far, none is left out here:",
+                ),
             ),
             hints=(
                 "How surprising is the measurement, and how much of the surprise belongs to the state?",
@@ -2303,6 +2308,14 @@ CHAPTER = Chapter(
                             "for a bearing that is off by more than a quarter turn: wrapping takes off whole turns alone",
                         )
                         for side in (1, -1)
+                    ),
+                    (
+                        {"seam": False, "turned": (3.05, 3.1)},
+                        "for a bearing that is off by nearly half a turn: however far, no measurement is left out here",
+                    ),
+                    (
+                        {"seam": False, "astray": 1e4},
+                        "for a distance that is off by kilometers: however far, no measurement is left out here",
                     ),
                     (
                         {"seam": False, "astray": 0.0, "turned": (0.0, 0.0)},

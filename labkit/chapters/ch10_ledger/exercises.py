@@ -63,7 +63,9 @@ def special_comparison(rng, kind, simulated, beyond):
     "sign": the value has the other sign. "edge": it is off by half a unit to the last bit, from an odd number. "limit":
     by half a unit and the bound. "small" and "far": printed with an exponent below 0, and within the half unit or far
     away; "large": with one above 0, within the half unit. "finest" and "fine": six decimals, and the value is off by less
-    than half a unit of the last, or by a little more. "wide": off by hundreds, within the bound. "whole": a whole number, of which the last digits are 0.
+    than half a unit of the last, or by a little more. "above" and "past": off by hardly more than half a unit, or than
+    half a unit and the bound. "wide": off by hundreds of thousands, within the bound. "astray": off by as much, and a
+    misprint where the value is the larger. "whole": a whole number, of which the last digits are 0.
     "beyond": it is off by a little more than half a unit and the bound, and a misprint where it is the larger. "zero": 0 is
     printed. "digits": eight digits, and the value is off by more than half a unit and the bound.
     """
@@ -85,8 +87,14 @@ def special_comparison(rng, kind, simulated, beyond):
     if kind in ("finest", "fine"):
         printed = f"{whole}{rng.integers(10, 100)}.{rng.integers(10, 100)}{rng.integers(100, 1000)}{rng.integers(3, 7)}"
         return printed, float(printed) + side * (0.3e-6 if kind == "finest" else 0.55e-6), 0.0, misprint, simulated
-    if kind == "wide":
-        return f"{whole}00", float(100 * whole + side * rng.uniform(200, 400)), 500.0, misprint, simulated
+    if kind in ("above", "past"):
+        printed, bound = f"{whole + rng.uniform(-0.4, 0.4):.2f}", 0.005 * (bound if kind == "above" else bound + 1)
+        off = (0.005 + bound * (kind == "past")) * (1 + rng.uniform(1e-4, 3e-4))
+        return printed, float(printed) + side * off, bound, beyond, simulated
+    if kind in ("wide", "astray"):
+        printed, wide = f"{whole}{rng.integers(10**5, 10**6)}.{rng.integers(10, 100)}", kind == "wide"
+        value = float(printed) + side * rng.uniform(2e5, 4e5)
+        return printed, value, 5e5 if wide else 0.005 * bound, misprint if wide else beyond, simulated
     if kind == "digits":
         printed = f"{100000 * whole + rng.uniform(0, 100000):.3f}"
         return printed, float(printed) + side * 2.7 * 0.0005, 1.5 * 0.0005, misprint, simulated
@@ -114,7 +122,10 @@ SPECIAL = tuple(
             (kind, "six decimals are printed: the last one is worth a millionth, and half of it is allowed")
             for kind in ("finest", "fine")
         ),
-        ("wide", "the bound is wide, some hundreds: it is allowed as it is"),
+        ("above", "the value is off by hardly more than half a unit: that is no longer within"),
+        ("past", "the value is off by hardly more than half unit and bound: that is no longer within"),
+        ("wide", "the bound is wide, some hundred thousands: it is allowed as it is"),
+        ("astray", "the value is off by hundreds of thousands: however far, the questions stay the same"),
         ("digits", "many digits are printed: what is allowed are half unit and bound, and no share of the number"),
     )
     for simulated, beyond in itertools.product((False, True), repeat=2)

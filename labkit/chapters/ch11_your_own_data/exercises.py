@@ -82,6 +82,17 @@ def axes_nearly_along(rng):
     return pose(exp_so3(rng.uniform(0.2, 2.0, (n, 1)) * axes), rng.uniform(-300, 300, (n, 3))), apart
 
 
+def axes_hardly_apart(rng):
+    """Motions about axes each of which stands 2 millionths of a radian, or hardly more, from the one it is compared with,
+    some of them the other way: their cosines are 1 to eleven digits.
+    """
+    n, apart = int(rng.integers(5, 9)), int(rng.integers(1, 3))
+    one, other = np.linalg.qr(rng.normal(size=(3, 2)))[0].T
+    along = rng.uniform(1.8e-6, 2.6e-6) / apart * np.arange(n)[:, None]
+    axes = (np.cos(along) * one + np.sin(along) * other) * np.where(np.arange(n) % 5 < 2, 1, -1)[:, None]
+    return pose(exp_so3(rng.uniform(0.2, 2.0, (n, 1)) * axes), rng.uniform(-300, 300, (n, 3))), apart
+
+
 def motions_of_half_a_turn(rng):
     """Motions that turn by nearly 180 deg: the sine of their angle is so small that rounding hides an axis in it."""
     T, apart = some_motions(rng, int(rng.integers(1, 4)))
@@ -576,6 +587,8 @@ CHAPTER = Chapter(
                  "right for axes in all directions, but not for parallel and opposite ones, where a cosine may come out as 1.0000000000000002:"),
                 (axes_nearly_along, metrics.Numbers(1e-6, "rad"),
                  "right for axes in all directions, but not for nearly parallel and nearly opposite ones, whose small angles count:"),
+                (axes_hardly_apart, metrics.Numbers(1e-6, "rad", absolute=True),
+                 "right for axes in all directions, but not for axes a few millionths of a radian apart, whose cosine is 1 to eleven digits:"),
                 (one_pair, metrics.Numbers(1e-6, "rad"), "right for several pairs, but not where one pair alone is to be compared, which gives one angle in an array:"),
                 (functools.partial(some_motions, apart=7, n=20), metrics.Numbers(1e-6, "rad"), "right for few motions, but not where there are twenty, compared seven apart:"),
                 (small_turns, metrics.Numbers(1e-6, "rad"), "right for large turns, but not for motions that turn by less than a quarter of a degree, which have an axis too:"),
