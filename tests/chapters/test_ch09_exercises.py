@@ -976,3 +976,14 @@ def test_a_test_of_two_statistics_or_of_a_change_is_not_enough():
     assert not ch09.hunt_1(ch09._two_alone, np.random.default_rng(0))
     assert not ch09.hunt_2(ch09._some_light_ones_left_out, np.random.default_rng(0))
     assert not ch09.hunt_4(ch09._second_for_half)
+
+
+@pytest.mark.parametrize("within", [0.1, 0.3])
+def test_the_mean_of_the_index_does_not_tell_what_light_particles_get(within):
+    def mean(resample, rng):
+        weights = np.array([0.5] + 10 * [0.05])
+        index = np.concatenate([resample(weights, rng) for _ in range(1000)])
+        return bool(abs(index.mean() - weights @ np.arange(11)) < within)
+
+    outcome = judge("hunt_2", mean)
+    assert outcome.status == NOT_YET and "too often one in the middle" in outcome.text

@@ -3727,6 +3727,7 @@ CHAPTER = Chapter(
                     _some_light_ones_left_out,
                     "never draws some of the lightest ones, and others of the same weight too often",
                 ),
+                TO_THE_MIDDLE,
                 (_specimen_2_of_many, "has the same defect, but among more than six particles only"),
             ),
             named="hunt_2-3cc571",
