@@ -15,10 +15,11 @@ PAIRS = 200  # times as many ways where two traits are told together: there are 
 LENGTH = re.compile(
     r"pose\[[01]\]|\bx\[[01]\]|point|position|origin|landmark|distance|range|way|speed|^`v_"
 )  # no angle
+ARGUMENT = re.compile(r"`([A-Za-z_]\w*)(?!.* is right$)")
 CONFUSED = 3  # pairs of words that are told, at most
 
 
-def case_words(draws, missed):
+def case_words(draws, missed, follows=lambda name, true: True):
     """What the draws on which an answer is wrong have in common, behind "it was wrong": "exactly where" no other has
     it, be it one of two things or both, "only where" some have; None when nothing is found, or when so few draws are
     looked at, or missed, that it may be chance.
@@ -29,6 +30,9 @@ def case_words(draws, missed):
         The arguments of every draw by name, and the expected result.
     missed : list of bool
         On which of them the answer is wrong.
+    follows : function
+        follows(name of an argument, on which draws something is true of it) -> whether the answer comes right with this
+        argument from the other draws: else it is not this that matters.
     """
     ways = math.comb(len(missed), sum(missed))
     if ways < WAYS:
@@ -36,6 +40,8 @@ def case_words(draws, missed):
     found = {words: true for words, true in _told(draws).items() if any(true) and not all(true)}
     told = {words: true for words, true in found.items() if all(t or not m for t, m in zip(true, missed))}
     parts = {words: true for words, true in found.items() if all(m or not t for t, m in zip(true, missed))}
+    found = {words: true for words, true in found.items() if words not in told or _follows(words, true, follows)}
+    told, parts = ({words: true for words, true in some.items() if words in found} for some in (told, parts))
     exact = (words for words, true in told.items() if true == missed)
     if words := next(exact, None) or _count_words(draws, missed):
         return f"exactly where {words}"
@@ -48,6 +54,11 @@ def case_words(draws, missed):
     if rarest and (sum(told[rarest]) / len(missed)) ** sum(missed) < 1 / WAYS:
         return f"only where {rarest}"
     return None
+
+
+def _follows(words, true, follows):
+    names = set(ARGUMENT.findall(words))
+    return len(names) != 1 or follows(*names, true)
 
 
 def _either(parts, missed):

@@ -3,6 +3,7 @@
 import copy
 import dis
 import functools
+import itertools
 import types
 
 import numpy as np
@@ -18,6 +19,7 @@ from .wording import closed, leading, on_ordinary_draws, shown_whole
 NOT_RIGHT = "\nNot right when called as "
 MORE_ACCURATE = ": is a case special there, or is it nearly right everywhere, and accurate enough there alone?"
 MANY_DIGITS = 1e-3  # by how much better some draws come out where one case is special
+EXCHANGED = 6  # draws with one argument from others, on which it is tried whether that argument matters
 TELLING = 6  # draws on which a choice is wrong as by an explanation, so that this is not chance
 LIKE_CHANCE = 8  # draws on which a choice must stay as it is, so that this is not chance
 RANDOM = {"default_rng", "random", "normal", "standard_normal", "multivariate_normal", "RandomState", "gauss"}
@@ -393,12 +395,37 @@ class Explanations(Named):
             draws.append((args, expected, run.error is not None or not metric.equal(run.result, expected)))
         missed = [wrong for *_, wrong in draws]
         named = [(dict(zip(self._names(args), args)), expected) for args, expected, _ in draws]
-        words = cases.case_words(named, missed)
+        words = cases.case_words(named, missed, functools.partial(self._follows, draws))
         if words is None or not words.startswith("exactly"):
             given = [args for args, *_ in draws]
             words = own_steps.condition_words(self.function, given, missed, kind) or words
         was = "was not right" if stopped else "was wrong"
         return words and f"On {len(draws)} draws it {was} {words}."
+
+    def _follows(self, draws, name, true):
+        """Whether an answer that is wrong on some of (arguments, expected, wrong) where something is true of the
+        argument of this name comes right with that argument from others, as far as this can be tried.
+        """
+        k = self._names(draws[0][0]).index(name)
+        others = [args for (args, *_), has in zip(draws, true) if not has]
+        mixed = (
+            (*args[:k], other[k], *args[k + 1 :])
+            for args, _, wrong in draws
+            for other in others
+            if wrong and np.shape(other[k]) == np.shape(args[k])
+        )
+        return all(self._is_right_for(args) is not False for args in itertools.islice(mixed, EXCHANGED))
+
+    def _is_right_for(self, args):
+        """Whether the answer is right for arguments of several draws; None where they do not go together."""
+        metric = self.exercise.metric
+        try:
+            with np.errstate(all="ignore"):
+                expected = self.exercise.reference(*copy.deepcopy(args))
+            metric.admit(expected, expected)
+        except Exception:  # what was drawn for other arguments may well not fit
+            return None
+        return self._is_right_on(self.function, args, metric, expected)
 
 
 def _times_off(deviation):

@@ -552,3 +552,18 @@ def test_a_part_is_told_where_it_is_all_of_it_on_some_draws():
     item = Exercise("whole", lambda v: np.exp(v) * v.sum(), draw=draws, metric=NUMBERS, hints=("a", "b", "c"))
     text = item.judge(lambda v: (np.exp(v) * v.sum())[:2]).text
     assert "What you return is the first 2 of the expected numbers or rows alone." in text
+
+
+def test_an_argument_is_told_only_if_another_one_in_its_place_mends():
+    """Where a is negative b is large: who is wrong for a large b hears nothing of the sign of a."""
+
+    def draw(rng):
+        side = rng.choice([-1.0, 1.0])
+        return side * rng.uniform(1, 2), rng.uniform(1, 2) + (4 if side < 0 else 0)
+
+    item = Exercise("sum", reference=np.add, draw=draw, metric=NUMBERS, hints=("a", "b", "c"), draws=6)
+    said = [
+        item.judge(answer, np.random.default_rng(0)).text
+        for answer in (lambda a, b: a + b**1.0 + max(-a, 0), lambda a, b: a + b * (1 + 0.1 * (b > 4.5)))
+    ]
+    assert "exactly where `a` is negative" in said[0] and "`a`" not in said[1]

@@ -1753,8 +1753,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _refused_again,
-                    "You apply the rule again to what it has kept, until nothing more goes: each time the limit shrinks, and good values go "
-                    "as well. It is applied once.",
+                    "You apply the rule again to what it has kept, until nothing more goes: each time it has another limit, and good "
+                    "values may go as well. It is applied once.",
                     id="reject_outliers-again",
                 ),
                 Mistake(
