@@ -41,6 +41,7 @@ SETS = (
     ("of poses many meters away", functools.partial(poses, reach=5e4)),
     ("of poses next to the origin", functools.partial(poses, reach=0.1, tip=0.1, std=0.01)),
     ("where a pose is the identity", one_as(lambda T: np.eye(4))),
+    ("where a pose is half a turn, the tool upside down", one_as(lambda T: np.diag([1.0, -1.0, -1.0, 1.0]))),
     ("where a pose comes twice", one_as(lambda T: T[0])),
     ("where x, y and z of all flanges are positive", functools.partial(poses, reach=900.0)),
     ("where x, y and z of all flanges are negative", functools.partial(poses, reach=-900.0)),
