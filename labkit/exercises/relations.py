@@ -349,8 +349,11 @@ def _a_factor_of_each_draw(results, expected):
     """Several numbers that are right in proportion, on every draw."""
     if len(results) < 2 or any(np.count_nonzero(e) < SEVERAL for e in expected):
         return None
-    if any(constant_ratio(r, e, EXACT) is None for r, e in zip(results, expected)):
+    ratios = [constant_ratio(r, e, EXACT) for r, e in zip(results, expected)]
+    if None in ratios:
         return None
+    if np.allclose(np.abs(ratios), 1, rtol=EXACT, atol=0):
+        return "your result is the expected one, but its sign is turned on some draws" if max(ratios) > 0 else None
     return (
         "your result is the expected one times a number that is not the same on every draw: is it to be divided by "
         "another one, its sum or its length, say?"

@@ -235,3 +235,11 @@ def test_what_differs_in_its_last_digits_is_no_multiple(ratio):
 
 def test_a_ratio_near_1_is_told_with_its_digits():
     assert words(lambda e: 1.0002 * e, VECTORS) == "your result is 1.0002 times the expected one, on every draw"
+
+
+def test_a_factor_that_is_a_sign_is_told_as_one():
+    expected = [np.array([1.0, 2.0, -4.0]), np.array([3.0, 1.0, 2.0]), np.array([0.5, 2.5, 1.5])]
+    results = [sign * e for sign, e in zip((1, -1, 1), expected)]
+    assert "its sign is turned on some draws" in relations.difference_words(
+        metrics.Numbers(1e-9), list(zip(results, expected))
+    )
