@@ -1340,7 +1340,7 @@ def _listens(draw, lead=""):
             drawn_from = np.random.default_rng(seeds[0])
             draw(function, drawn_from)
             if drawn_from.bit_generator.state != np.random.default_rng(seeds[0]).bit_generator.state:
-                return f"{lead}what you draw from `rng` changes nothing: 8 seeds give the same. Is it far too small, or not used?"
+                return f"{lead}what you draw from `rng` changes nothing on one draw, which 8 seeds give alike. Is it far too small, or not used?"
             return f"{lead}whatever `rng` is given, the same comes out: draw the random numbers from it."
         if not all(map(np.array_equal, first, again)):
             return f"{lead}two runs with the same seed differ: draw from the `rng` you are given alone, and keep nothing for the next call."
@@ -2020,7 +2020,7 @@ def _catches(specimen, good, others, extra=()):
                 if not verdict:
                     ever = any(verdict_on(other, test, rng) is True for other in (function, *good))
                     more = "" if ever else " It says False of every correct function it is tried on."
-                    often = "now and then also rejects" if run else "also rejects"
+                    often = "also rejects, though not each time," if run else "also rejects"
                     return f"your test {often} a correct function ({GOOD_WORDS[function]}): it asks for more than must hold.{more}"
             return None
 
