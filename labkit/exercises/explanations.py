@@ -395,16 +395,16 @@ class Explanations(Named):
             draws.append((args, expected, run.error is not None or not metric.equal(run.result, expected)))
         missed = [wrong for *_, wrong in draws]
         named = [(dict(zip(self._names(args), args)), expected) for args, expected, _ in draws]
-        words = cases.case_words(named, missed, functools.partial(self._follows, draws))
+        words = cases.case_words(named, missed, functools.partial(self._follows, draws, kind))
         if words is None or not words.startswith("exactly"):
             given = [args for args, *_ in draws]
             words = own_steps.condition_words(self.function, given, missed, kind) or words
         was = "was not right" if stopped else "was wrong"
         return words and f"On {len(draws)} draws it {was} {words}."
 
-    def _follows(self, draws, name, true):
+    def _follows(self, draws, kind, name, true):
         """Whether an answer that is wrong on some of (arguments, expected, wrong) where something is true of the
-        argument of this name comes right with that argument from others, as far as this can be tried.
+        argument of this name comes right with that argument from others, as far as this can be tried in the time.
         """
         k = self._names(draws[0][0]).index(name)
         others = [args for (args, *_), has in zip(draws, true) if not has]
@@ -414,7 +414,8 @@ class Explanations(Named):
             for other in others
             if wrong and np.shape(other[k]) == np.shape(args[k])
         )
-        return all(self._is_right_for(args) is not False for args in itertools.islice(mixed, EXCHANGED))
+        tried = itertools.takewhile(lambda _: kind.left(), itertools.islice(mixed, EXCHANGED))
+        return all(self._is_right_for(args) is not False for args in tried)
 
     def _is_right_for(self, args):
         """Whether the answer is right for arguments of several draws; None where they do not go together."""
