@@ -594,6 +594,13 @@ def late(due):
     return lambda w, p, k, n: (w * p / (w * p).sum(), bool(due(k, n)))
 
 
+def in_ten_thousand_steps(grid, pose, bearing, r_max):
+    r = np.minimum(grid.resolution / 2 * np.arange(10_000), r_max)
+    angle = pose[2] + bearing
+    hits = r[grid.at(pose[:2] + r[:, None] * [np.cos(angle), np.sin(angle)]) == maps.OCCUPIED]
+    return hits[0] if len(hits) else r_max
+
+
 PASSED_BEFORE = [
     ("distance_field_weight", of_each_cell_once, "each of them counts"),
     ("landmark_weight", of_the_landmark_that_fits_best, "row k of z is of row k"),
@@ -670,6 +677,7 @@ PASSED_BEFORE = [
     ("cast_ray", halved, "the ray is halved"),
     ("cast_ray", mirrored, "the other way along y"),
     ("cast_ray", walked(0.5, None), "some 20 cm away"),
+    ("cast_ray", in_ten_thousand_steps, "some 5,200 cells away"),
     ("landmark_weight", by_the_arcsine, "folded at 90 deg"),
     ("circular_mean", lambda a, w: np.angle(np.sum(a * np.exp(1j * w))), "exchanged"),
     ("sample_motion", by_one_pair, "equally far"),
@@ -759,7 +767,7 @@ def typed(text):
     "name, text, words",
     [
         ("cast_ray", IN_NUMBERS_OF_STEPS, "it is to be multiplied by `step`"),
-        ("cast_ray", IN_THIRTY_PLACES, "30 places are far too few"),
+        ("cast_ray", IN_THIRTY_PLACES, "You look at about 30 places along the ray"),
         ("distance_field_weight", OF_ALL_ROWS_AND_COLUMNS, "the row and the column of one end point"),
     ],
 )

@@ -13,6 +13,7 @@ from ...exercises import metrics
 from ...exercises.budget import seconds
 from ...exercises.engine import Chapter, Exercise, Prediction
 from ...exercises.outcome import Mistake
+from ...exercises.special import LONGEST
 from ...exercises.value import Value
 from ...fast import maps as fast_maps
 from ...geometry import planar
@@ -236,6 +237,7 @@ def _casts(cast, grid, poses, bearings):
 
 
 TYPED_IN = tuple(steps - end for steps in (100, 200, 300, 400, 500, 1000) for end in (0, 1))  # numbers of steps
+FAR_TIMES = 36  # as many cells lie on a ray over thousands of cells as on one down the hall
 EVERY_WAY = tuple(functools.partial(plain_ray, way=way) for way in ((1, 1), (-1, 1), (-1, -1), (1, -1)))
 
 
@@ -303,6 +305,15 @@ def ray_down_a_hall(rng):
     theta, angle = rng.uniform(-3, 3), rng.uniform(-0.05, 0.05)
     pose = np.array([start, rng.uniform(3.5, 4.5), theta])
     return maps.OccupancyGrid(cells, 0.4), pose, float(planar.wrap_angle(angle - theta)), 75.0
+
+
+def ray_over_thousands_of_cells(rng):
+    """A ray to a wall some 520 m and 5,200 cells away, and a scanner that reaches 600 m."""
+    cells = np.full((30, 5600), maps.FREE)
+    cells[:, 5200:] = maps.OCCUPIED
+    theta, angle = rng.uniform(-3, 3), rng.uniform(-0.001, 0.001)
+    pose = np.array([rng.uniform(1.0, 3.0), rng.uniform(1.2, 1.8), theta])
+    return maps.OccupancyGrid(cells, 0.1), pose, float(planar.wrap_angle(angle - theta)), 600.0
 
 
 def ray_by_a_far_sighted_scanner(rng):
@@ -620,6 +631,26 @@ class Reach(metrics.Numbers):
         more = "more" if result > expected else "less"
         way = "the way to what ends the ray first, an occupied cell or r_max"
         return [replace(off, words=f"your result is {off.amount:.3g} m {more} than {way}")]
+
+
+def right_however_far(student, rng):
+    """A property of `cast_ray`: right on a ray over thousands of cells, too; not asked of one that takes its time, nor
+    of one that fails there, as one may that is tried with a change, and with a limit to its steps.
+    """
+    began, far, metric = seconds(), ray_over_thousands_of_cells(rng), Reach(0.16, "m", absolute=True)
+    student(*ray_down_a_hall(rng))
+    if FAR_TIMES * (seconds() - began) > LONGEST:
+        return None
+    try:
+        result = student(*far)
+    except Exception:
+        return None
+    if metric.equal(result, maps.walk_ray(*far)):
+        return None
+    return (
+        "right so far, but not on a ray to a wall some 5,200 cells away that r_max = 600 m reaches (does yours take as many "
+        "steps on every ray, or end after so many of them?)."
+    )
 
 
 # References that the library has in another form ---------------------------------------------------------------------
@@ -1086,6 +1117,10 @@ def _hits(grid, pose, bearing, r_max, step):
 
 def _ray_in_steps(grid, pose, bearing, r_max, cells):
     return _hits(grid, pose, bearing, r_max, cells * grid.resolution).min(initial=r_max)
+
+
+def _ray_in_places(grid, pose, bearing, r_max, places):
+    return _hits(grid, pose, bearing, r_max, r_max / (places - 1)).min(initial=r_max)
 
 
 def _steps_of_a_ray(grid, pose, bearing, r_max, cells):
@@ -2632,6 +2667,7 @@ CHAPTER = Chapter(
                     "grid.at says so:",
                 ),
             ],
+            properties=(right_however_far,),
             hints=(
                 "Walk along the ray in steps smaller than a cell, and stop in the first occupied one.",
                 "The direction is theta + bearing. Walk along it in steps of half a cell: grid.at([x, y]) says what is there, and the first maps.OCCUPIED ends the beam. If none comes, r_max.",
@@ -2702,6 +2738,15 @@ CHAPTER = Chapter(
                         "Your steps are longer than a cell is wide: they pass over corners and thin walls. Half a cell will do.",
                     )
                     for cells in (1.5, 2, 2.5, 3, 4, 5, 10)
+                ),
+                *(
+                    Mistake(
+                        functools.partial(_ray_in_places, places=places),
+                        f"You look at about {count} places along the ray, however far r_max is: that is too few. Make steps of half a cell.",
+                        id=f"ray-in-{places}-places",
+                    )
+                    for count in (10, 20, 30, 50, 100)
+                    for places in (count, count + 1)
                 ),
                 Mistake(_ray_to_infinity, "Nothing hit means r_max, the scanner's limit, not infinity."),
                 Mistake(_ray_without_end, "A scanner sees r_max at most: return r_max when nothing is hit before."),
