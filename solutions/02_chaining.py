@@ -352,7 +352,7 @@ ex.predict("two_loops", guess, reveal=stages.two_loops)
 # ## The sheet's files (*further*)
 #
 # The sheet's programs begin and end with files: `LoadSys` reads the three points of a system, `LoadSysN` eight systems (`4_2_System1.txt` to `4_2_System8.txt`), `LoadCalFrames` the poses of chapter 3 from
-# `Kreisel.txt`, `SaveCal` writes the tool to `Kalibrierung.txt`. None of them is printed. So here is a form of our own: a line a point, $x$ $y$ $z$ in mm, origin first; what follows a `#` is a comment;
+# `Kreisel.txt`, `SaveCal` writes the tool to `Kalibrierung.txt`. None of them is printed. So here is a form of our own: a line a point, three finite numbers $x$ $y$ $z$ in mm, origin first; what follows a `#` is a comment;
 # empty lines count for nothing; some write 1,5 for 1.5.
 #
 # A reader has two duties. It returns what is there. And where something is wrong, it says **in one sentence what it expected, what came, and in which line**: `if (!LoadSys(...)) return EXIT_FAILURE;` tells the

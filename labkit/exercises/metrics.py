@@ -5,7 +5,7 @@ deviations from the expected value, each with a unit and a tolerance.
 """
 
 import inspect
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 
 import numpy as np
@@ -13,7 +13,6 @@ import numpy as np
 from ..geometry import frames
 
 MAX_ENTRIES = 10_000_000
-FLOAT32_TOLERANCE = 2e-5
 INTEGERS = (int, np.integer)
 ORTHONORMAL = 1e-5  # how far R'R may be from I, also where the angle may be off by much more
 
@@ -35,13 +34,14 @@ class RefusedBeside(Refused):
 
 @dataclass(frozen=True)
 class Deviation:
-    """How far one aspect of a result is off."""
+    """How far one aspect of a result is off; with `several`, the entry is the worst of those that are."""
 
     what: str
     amount: float
     unit: str
     tolerance: float
     words: str = ""
+    several: bool = False
 
     @property
     def within(self):
@@ -50,7 +50,8 @@ class Deviation:
     def __str__(self):
         if self.words:
             return f"{self.what}: {self.words}" if self.what else self.words
-        what = f"{self.what} is off" if self.what else "it is off"
+        entry = self.what.replace("one entry", "the worst entry") if self.several else self.what
+        what = f"{entry} is off" if entry else "it is off"
         return f"{what} by {self.amount:.3g}{' ' + self.unit if self.unit else ''}"
 
 
@@ -210,7 +211,8 @@ def _describe(result):
     return f"{'an' if name[0] in 'aeiouAEIOU' or name == 'ndarray' else 'a'} {name}"
 
 
-def _is_single(array):
+def is_single(array):
+    """Whether an array holds numbers of single precision, or of half."""
     return array.dtype.itemsize < 8 and array.dtype.kind == "f"
 
 
@@ -219,14 +221,12 @@ class Numbers(Metric):
     """A number or an array: largest deviation, relative to the size of the expected entries (at `least` 1).
 
     `tol` is that relative tolerance; `unit` names the deviation. With `absolute` the tolerance is in this unit, however
-    large the entries are; with `least=0` it shrinks with them, however small they are. With `double` it is the same for
-    numbers of single precision: what is read keeps all digits.
+    large the entries are; with `least=0` it shrinks with them, however small they are.
     """
 
     tol: float = 1e-9
     unit: str = ""
     absolute: bool = False
-    double: bool = False
     least: float = 1.0
 
     def admit(self, result, expected):
@@ -235,9 +235,9 @@ class Numbers(Metric):
     def deviations(self, result, expected):
         expected = np.asarray(expected, dtype=float)
         scale = 1.0 if self.absolute else max(self.least, np.abs(expected).max(initial=0.0))
-        tol = max(self.tol, FLOAT32_TOLERANCE) if _is_single(result) and not self.double else self.tol
-        amount = float(np.abs(result.astype(float) - expected).max(initial=0.0))
-        return [Deviation("one entry" if result.ndim else "", amount, self.unit, tol * scale)]
+        off, tol = np.abs(result.astype(float) - expected), self.tol * scale
+        what, amount = "one entry" if result.ndim else "", float(off.max(initial=0.0))
+        return [Deviation(what, amount, self.unit, tol, several=bool((off > tol).sum() > 1))]
 
 
 @dataclass(frozen=True)
@@ -251,8 +251,7 @@ class Angles(Metric):
 
     def deviations(self, result, expected):
         off = np.abs(np.angle(np.exp(1j * (result.astype(float) - expected)))).max(initial=0.0)
-        tol = max(self.tol, FLOAT32_TOLERANCE) if _is_single(result) else self.tol
-        return [Deviation("the angle", float(np.rad2deg(off)), "deg", float(np.rad2deg(tol)))]
+        return [Deviation("the angle", float(np.rad2deg(off)), "deg", float(np.rad2deg(self.tol)))]
 
 
 @dataclass(frozen=True)
@@ -308,16 +307,24 @@ class Rotations(Metric):
         return as_array(result, np.shape(expected))
 
     def deviations(self, result, expected):
-        single = _is_single(result)
         R = result.astype(float)
         skewness = float(np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(initial=0.0))
-        allowed = max(FLOAT32_TOLERANCE if single else 0.0, min(np.deg2rad(self.deg), ORTHONORMAL))
+        allowed = min(np.deg2rad(self.deg), ORTHONORMAL)
         if skewness > 1e-3 or (np.linalg.det(R) < 0).any() or not _are_rotations(expected):
             entry = float(np.abs(R - expected).max(initial=0.0))
-            return [Deviation("the rotation", entry, "in one entry", allowed)]
+            return [
+                Deviation(
+                    "the rotation",
+                    entry,
+                    "in its worst entry",
+                    allowed,
+                )
+            ]
         angle = float(np.rad2deg(np.max(frames.rotation_angle(np.swapaxes(R, -1, -2) @ expected), initial=0.0)))
-        tol = max(self.deg, 2e-3) if single else self.deg
-        return [Deviation("the rotation", angle, "deg", tol), Deviation("RᵀR - I", skewness, "", max(allowed, 1e-9))]
+        return [
+            Deviation("the rotation", angle, "deg", self.deg),
+            Deviation("RᵀR - I", skewness, "", max(allowed, 1e-9)),
+        ]
 
 
 def _are_rotations(matrices):
@@ -348,11 +355,8 @@ class Poses(Metric):
 
     def deviations(self, result, expected):
         turn = Rotations(self.deg).deviations(result[..., :3, :3], expected[..., :3, :3])
-        tol = self.mm
-        if _is_single(result):
-            tol = max(tol, FLOAT32_TOLERANCE * max(1.0, np.abs(expected[..., :3, 3]).max(initial=0.0)))
         distance = np.linalg.norm(result[..., :3, 3].astype(float) - expected[..., :3, 3], axis=-1).max(initial=0.0)
-        return [*turn, Deviation("the origin", float(distance), self.unit, tol)]
+        return [*turn, Deviation("the origin", float(distance), self.unit, self.mm)]
 
 
 @dataclass(frozen=True)
@@ -454,10 +458,7 @@ class Several(Metric):
     def deviations(self, result, expected):
         found = []
         for name, metric, part, want in zip(self.names, self.metrics, result, expected):
-            found += [
-                Deviation(_joined(name, d.what), d.amount, d.unit, d.tolerance, d.words)
-                for d in metric.deviations(part, want)
-            ]
+            found += [replace(d, what=_joined(name, d.what)) for d in metric.deviations(part, want)]
         return found
 
     def parts(self, result, expected):
@@ -519,6 +520,4 @@ class Through(Metric):
             image = np.asarray(self.function(result.astype(float)))
         except ValueError as error:
             raise Refused(str(error)) from None
-        if _is_single(result):
-            image = image.astype(np.float32)
         return self.metric.deviations(image, self.function(expected))

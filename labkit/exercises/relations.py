@@ -9,10 +9,11 @@ import itertools
 import numpy as np
 
 from ..geometry import frames
-from .metrics import Angles, Exactly, Numbers, Poses, Rotations, Several, Through
+from .metrics import Angles, Exactly, Numbers, Poses, Rotations, Several, Through, is_single
 
 CLOSE = 1e4  # tolerances: an answer nearer than this is nearly right, but not accurate enough ...
 FAR = 1e-2  # ... unless it is off by more than this: a coarse tolerance leaves no room for less accurate answers
+SINGLE = 2e-6  # how far numbers of single precision may be off after some computing
 SHEARED = 1e-3  # from which on RᵀR differs from I by more than rounding
 SIMPLE = 12  # the largest number in a fraction that is worth telling
 NEARLY = 1e-3  # how nearly a result made by differences, say, must be a multiple of the right one
@@ -55,8 +56,15 @@ def _relation(metric, results, expected, sizes, whole):
         if any(d.words and not d.within for pair in zip(results, expected) for d in metric.deviations(*pair)):
             return None
         metric = Numbers(1e-9)
+    single = any(is_single(np.asarray(r)) for r in results)
     results = [np.asarray(r, dtype=float) for r in results]
     expected = [np.asarray(e, dtype=float) for e in expected]
+
+    if single and all(
+        np.abs(r - e).max(initial=0.0) <= SINGLE * max(1.0, np.abs(e).max(initial=0.0))
+        for r, e in zip(results, expected)
+    ):
+        return "your result is right as far as single precision goes, some seven digits: leave float32 away"
 
     if _are_rounded(results, expected):
         return "your result is the right one, rounded: hand over all digits, and go in no whole steps"

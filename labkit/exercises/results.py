@@ -7,6 +7,8 @@ import numpy as np
 
 from . import metrics, rerun
 
+FLOAT32_TOLERANCE = 2e-5  # relative, of numbers of single precision that are compared with a mistake's
+
 
 @dataclass(frozen=True)
 class Refusal:
@@ -60,7 +62,7 @@ def equal_arrays(a, b, atol=1e-12):
     if isinstance(b, tuple):
         return isinstance(a, tuple | list) and len(a) == len(b) and all(equal_arrays(*ab, atol) for ab in zip(a, b))
     a, b = np.asarray(a), np.asarray(b)
-    rtol = metrics.FLOAT32_TOLERANCE if metrics._is_single(a) or metrics._is_single(b) else 1e-9
+    rtol = FLOAT32_TOLERANCE if metrics.is_single(a) or metrics.is_single(b) else 1e-9
     kind = complex if "c" in (a.dtype.kind, b.dtype.kind) else float
     return a.shape == b.shape and np.allclose(a.astype(kind), b.astype(kind), rtol=rtol, atol=atol, equal_nan=True)
 

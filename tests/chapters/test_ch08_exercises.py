@@ -145,7 +145,7 @@ def test_the_printed_example_takes_the_state_or_both_results():
     item = ITEMS["corrected"]
     assert item.judge(x).status == item.judge((x, cov)).status == CORRECT
     assert "covariance is not: it is twice the right one." in item.judge((x, 2 * cov)).text
-    assert "covariance is not: one entry is off by" in item.judge((x, cov + 1)).text
+    assert "covariance is not: the worst entry is off by" in item.judge((x, cov + 1)).text
     assert item.judge((np.array([12.5, 5.0]), cov)).text == item.judge(np.array([12.5, 5.0])).text
 
 

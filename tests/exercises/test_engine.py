@@ -84,11 +84,15 @@ def with_scipy(T):
         with_scipy,
         np.linalg.inv,
         lambda T: np.asmatrix(np.linalg.inv(T)),
-        lambda T: THEIRS["invert"](T).astype(np.float32),
     ],
 )
 def test_every_correct_way_is_accepted(way):
     assert INVERT.judge(way).status == CORRECT
+
+
+def test_single_precision_is_refused_by_its_name():
+    outcome = INVERT.judge(lambda T: THEIRS["invert"](T).astype(np.float32))
+    assert outcome.status == NOT_YET and "as far as single precision goes" in outcome.text
 
 
 def test_scipy_rotation_counts_as_its_matrix():

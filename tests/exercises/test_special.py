@@ -25,7 +25,7 @@ def test_who_is_right_everywhere_hears_nothing():
 
 
 def test_the_place_is_named_with_what_is_wrong_there():
-    assert told(short_ones(lambda v: v)).startswith("right so far, but not of a long vector: one entry is off")
+    assert told(short_ones(lambda v: v)).startswith("right so far, but not of a long vector: the worst entry is off")
     assert told(short_ones(lambda v: v[:2])).startswith("right so far, but not of a long vector: expected an array")
     assert told(short_ones(lambda v: v[9])).startswith(
         "right so far, but not of a long vector: there it raises IndexError"

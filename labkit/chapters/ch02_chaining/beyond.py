@@ -312,8 +312,8 @@ FILES = [
         "read_system",
         reference=read_system,
         draw=TEXTS,
-        metric=Points(1e-12, "mm", double=True),
-        properties=(names_the_line, right_where(read_system, Points(1e-12, "mm", double=True), *TYPED)),
+        metric=Points(1e-12, "mm"),
+        properties=(names_the_line, right_where(read_system, Points(1e-12, "mm"), *TYPED)),
         hints=(
             "Go through the lines with their numbers; a line that holds nothing but a comment holds no point.",
             "Cut each line at `#`, make commas points, split it at blanks. Three finite numbers are a point; whatever else is left is a fault, and its line is named.",

@@ -35,9 +35,9 @@ def decode_packet(data):
 
 
 DECODED = metrics.Several(
-    metrics.Numbers(1e-9, "s", double=True),
-    metrics.Numbers(1e-9, "mm", double=True),
-    metrics.Numbers(1e-9, double=True),
+    metrics.Numbers(1e-9, "s"),
+    metrics.Numbers(1e-9, "mm"),
+    metrics.Numbers(1e-9),
     names=("time", "position", "quaternion"),
 )
 
@@ -217,14 +217,13 @@ def kron_row(A, B):
     return np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3))
 
 
-def stacked(rng, sign, first=None):
+def stacked(rng, sign, first=None, trace=None):
     """The Kronecker matrix of noisy motions, so noisy that its null vector is visibly no rotation, and with this sign
-    of the null vector's determinant, and of the rotation's first entry, where it is positive beside a negative trace;
-    `eig`, which does not sort, has another first, nor that of the largest value, and `eigh` gives it the same sign.
+    of the null vector's determinant, and of the rotation's first entry and its trace, any if None; `eig`, which does not sort, has another first, nor that of the largest value, and `eigh` gives it the same sign.
     """
     while True:
         R = exp_so3(rng.normal(size=3))
-        if not _begins_with(R, first):
+        if not _has_signs(R, first, trace):
             continue
         M = ax_xb.kronecker_matrix(*motions(rng, std_deg=8.0, R=R))
         unsorted = np.linalg.eig(M.T @ M)[0]
@@ -233,7 +232,7 @@ def stacked(rng, sign, first=None):
         X = _null(M).reshape(3, 3)
         if np.linalg.eigh(M.T @ M)[1][:, 0] @ X.ravel() < 0 or sign * np.linalg.det(X) < 0:
             continue
-        if _begins_with(sign * X, first) and np.abs(3 * X @ X.T - np.eye(3)).max() > 0.01:
+        if _has_signs(sign * X, first, trace) and np.abs(3 * X @ X.T - np.eye(3)).max() > 0.01:
             return (M,)
 
 
@@ -242,13 +241,21 @@ def blocks(rng, n, **noise):
     return (ax_xb.kronecker_matrix(*motions(rng, n, **noise)),)
 
 
-def _begins_with(R, first):
-    """Whether the first entry has this sign (None: any), and a trace that is negative beside a positive one."""
-    return not first or first * R[0, 0] >= 0.05 and (first < 0 or np.trace(R) <= -0.05)
+def _has_signs(R, first, trace):
+    """Whether first entry and trace have these signs (None: any)."""
+    return (not first or first * R[0, 0] >= 0.05) and (not trace or trace * np.trace(R) >= 0.05)
 
 
 BOTH_SIGNS = tuple(functools.partial(stacked, sign=sign) for sign in (1, -1))
-ALL_SIGNS = tuple(functools.partial(stacked, sign=sign, first=first) for sign in (1, -1) for first in (1, -1))
+ALL_SIGNS = tuple(
+    functools.partial(stacked, sign=sign, first=first, trace=trace)
+    for sign, first, trace in ((1, 1, -1), (1, -1, None), (-1, 1, -1), (-1, -1, None))
+)
+
+
+def gentle_turn(rng):
+    """The same for a rotation whose first entry and trace are positive, with any sign of the null vector's determinant."""
+    return stacked(rng, rng.choice([-1, 1]), first=1, trace=1)
 
 
 def rotation_from_nullvector(M):
@@ -1116,7 +1123,7 @@ CHAPTER = Chapter(
         Exercise(
             "rotation_from_nullvector",
             reference=rotation_from_nullvector,
-            draw=ALL_SIGNS,
+            draw=(*ALL_SIGNS, gentle_turn),
             metric=metrics.Rotations(1e-5),
             noisy=(
                 (
@@ -1163,6 +1170,15 @@ CHAPTER = Chapter(
                         "You made the first entry positive, but R[0, 0] may well be negative. The sign that a rotation needs is that of its determinant.",
                     )
                     for nearest in (lie.nearest_rotation, _orthonormal)
+                ),
+                *(
+                    Mistake(
+                        lambda M, nearest=nearest: nearest(-_first_positive(_null(M)).reshape(3, 3, order="F")),
+                        "You made the first entry negative, but R[0, 0] is positive in every gentle turn. The sign that a rotation needs is "
+                        "that of its determinant.",
+                        id=f"rotation_from_nullvector-first-negative{words}",
+                    )
+                    for nearest, words in ((lie.nearest_rotation, ""), (_orthonormal, "-as-it-comes"))
                 ),
                 *(
                     Mistake(
