@@ -56,15 +56,11 @@ def _relation(metric, results, expected, sizes, whole):
         if any(d.words and not d.within for pair in zip(results, expected) for d in metric.deviations(*pair)):
             return None
         metric = Numbers(1e-9)
-    single = any(is_single(np.asarray(r)) for r in results)
+    if _are_single(results, expected):
+        return "your result is right as far as single precision goes, some seven digits: leave float32 away"
+
     results = [np.asarray(r, dtype=float) for r in results]
     expected = [np.asarray(e, dtype=float) for e in expected]
-
-    if single and all(
-        np.abs(r - e).max(initial=0.0) <= SINGLE * max(1.0, np.abs(e).max(initial=0.0))
-        for r, e in zip(results, expected)
-    ):
-        return "your result is right as far as single precision goes, some seven digits: leave float32 away"
 
     if _are_rounded(results, expected):
         return "your result is the right one, rounded: hand over all digits, and go in no whole steps"
@@ -523,6 +519,13 @@ def _common_ratio(answer, expected):
 
 
 # Digits --------------------------------------------------------------------------------------------------------------
+
+
+def _are_single(results, expected):
+    """Whether results are of single precision, and right as far as that goes."""
+    pairs = [(np.asarray(r), np.asarray(e, dtype=float)) for r, e in zip(results, expected)]
+    near = all(np.abs(r - e).max(initial=0.0) <= SINGLE * max(1.0, np.abs(e).max(initial=0.0)) for r, e in pairs)
+    return near and any(is_single(r) for r, _ in pairs)
 
 
 def _are_rounded(results, expected):
