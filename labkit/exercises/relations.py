@@ -56,17 +56,11 @@ def _relation(metric, results, expected, sizes, whole):
         if any(d.words and not d.within for pair in zip(results, expected) for d in metric.deviations(*pair)):
             return None
         metric = Numbers(1e-9)
-    if _are_single(results, expected):
-        return "your result is right as far as single precision goes, some seven digits: leave float32 away"
-
+    digits = _digits_lost(results, expected)
+    if digits:
+        return digits
     results = [np.asarray(r, dtype=float) for r in results]
     expected = [np.asarray(e, dtype=float) for e in expected]
-
-    if _are_rounded(results, expected):
-        return "your result is the right one, rounded: hand over all digits, and go in no whole steps"
-
-    if _are_cut_off(results, expected):
-        return "your result is the right one without its decimals: is it put into an array of whole numbers?"
 
     def holds(change):
         try:
@@ -93,6 +87,18 @@ def _relation(metric, results, expected, sizes, whole):
     part = part or (None if near else _a_factor_of_each_draw(results, expected))
     part = part or (None if near else _one_part(results, expected, holds, unit))
     return part or _offset(results, expected, unit)
+
+
+def _digits_lost(results, expected):
+    """That digits alone are missing: numbers of single precision, rounded ones, or whole ones."""
+    if _are_single(results, expected):
+        return "your result is right as far as single precision goes, some seven digits: leave float32 away"
+    results, expected = ([np.asarray(v, dtype=float) for v in values] for values in (results, expected))
+    if _are_rounded(results, expected):
+        return "your result is the right one, rounded: hand over all digits, and go in no whole steps"
+    if _are_cut_off(results, expected):
+        return "your result is the right one without its decimals: is it put into an array of whole numbers?"
+    return None
 
 
 def _is_near(metric, results, expected):
