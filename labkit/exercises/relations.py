@@ -95,7 +95,7 @@ def _digits_lost(results, expected):
         return "your result is right as far as single precision goes, some seven digits: leave float32 away"
     results, expected = ([np.asarray(v, dtype=float) for v in values] for values in (results, expected))
     if _are_rounded(results, expected):
-        return "your result is the right one, rounded: hand over all digits, and go in no whole steps"
+        return "your result is the right one, rounded: hand over all digits"
     if _are_cut_off(results, expected):
         return "your result is the right one without its decimals: is it put into an array of whole numbers?"
     return None

@@ -758,9 +758,7 @@ def _equal_depths():
 
 FLAT, NEXT_TO = 1.0, 1e-2  # curvature that is next to nothing; how far off a minimum may be that is told as such
 WITHIN_REACH = 0.05  # of the saddle, from where Newton's steps end in it
-NOT_DOWNHILL = (
-    "A search downhill ends in a well; Newton's step ends in the saddle, from a start near the pass between the wells."
-)
+NOT_DOWNHILL = "A search downhill ends in a well, and so do Newton's steps from a start near it. They end in the saddle from a start near the pass between the wells."
 
 
 CHAPTER = Chapter(
@@ -1402,10 +1400,12 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: wells.extrema()[0].x,
                     f"That is the local minimum. {NOT_DOWNHILL}",
+                    id="saddle-4988a7",
                 ),
                 Mistake(
                     lambda: wells.extrema()[1].x,
                     f"That is the global minimum. {NOT_DOWNHILL}",
+                    id="saddle-949f0c",
                 ),
                 Mistake(
                     lambda: (wells.extrema()[0].x + wells.extrema()[1].x) / 2,
@@ -1794,7 +1794,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda r, J, damping: opt.gauss_newton_step(r, J) / (1 + damping),
-                    "You shortened the step of Gauss and Newton. Damping turns it as well: λ is added to the matrix before solving.",
+                    "You shortened the step of Gauss and Newton. Damping also turns it where there are several unknowns, and shortens it by what J is: λ is added to the matrix before solving.",
                     id="damped-shortened",
                 ),
                 Mistake(

@@ -330,6 +330,11 @@ def _without_det(R, t, x):
     return U @ Vt
 
 
+def _as_it_comes(X):
+    U, _, Vt = np.linalg.svd(X)
+    return U @ Vt
+
+
 def _all_signs_turned(R, t, x):
     U, _, Vt = np.linalg.svd(-(t @ R).T @ x)
     return U @ Vt * np.linalg.det(U @ Vt)
@@ -1026,6 +1031,15 @@ LITERATURE = [
                 "Least squares over all nine entries gives no rotation where the moves lie nearly in a plane or noise is about: sum the outer products "
                 "and take the nearest rotation.",
                 id="li-nine-entries-differences",
+            ),
+            *(
+                Mistake(
+                    _rotation(lambda R, t, x, nearest=nearest: nearest(np.linalg.lstsq(x, -t @ R, rcond=None)[0].T)),
+                    "This is the rotation next to nine entries found by least squares. Where the moves lie nearly in a plane they tell little "
+                    "of one direction, and the rotation takes it over: sum the outer products instead, and take the rotation nearest to the sum.",
+                    id=f"li-nine-entries-{words}",
+                )
+                for nearest, words in ((nearest_rotation, "turned"), (_as_it_comes, "as-it-comes"))
             ),
         ],
     ),

@@ -1158,7 +1158,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda M: np.sqrt(3) * _signed(_null(M).reshape(3, 3, order="F")),
-                    "The scale is right, but noise has sheared the matrix: its columns are not orthonormal. Project it to SO(3).",
+                    "Scaled so, noise has still sheared the matrix: its columns are not orthonormal. Project it to SO(3).",
+                    id="rotation_from_nullvector-4c6c17",
                 ),
                 Mistake(
                     lambda M: _orthonormal(_null(M).reshape(3, 3, order="F")),

@@ -917,7 +917,7 @@ CHAPTER = Chapter(
                 Mistake(_largest_information, "You took the candidate whose own information is largest. It may well tell what is known already: compute what it leaves, with C."),
                 Mistake(_least_certain_first, "You look at the first number of each reading alone, and at how well it can be predicted. Compute what the whole reading leaves, and compare determinants."),
                 Mistake(_largest_derivative, "You took the candidate with the largest derivative. It may well tell what is known already: compute what it leaves."),
-                Mistake(_largest_volume, "You took the candidate that leaves most unknown: the smallest determinant is the best."),
+                Mistake(_largest_volume, "You took the candidate that leaves most unknown. The best leaves the smallest determinant of the covariance, which is the largest of the information.", id="next_pose-ce8578"),
                 Mistake(_least_certain, "You took the reading that can be predicted least. Its numbers may all say the same: compare the determinants of what is left."),
                 Mistake(_least_certain_volume, "You took the candidate with the largest det(J C J^T), the numbers that can be predicted least. They have noise as well: det(J C J^T + I)."),
                 Mistake(lambda C, c: next_pose(C, c) + 1, "Candidates count from 0."),
