@@ -1794,7 +1794,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda r, J, damping: opt.gauss_newton_step(r, J) / (1 + damping),
-                    "You shortened the step of Gauss and Newton. Damping also turns it where there are several unknowns, and shortens it by what J is: λ is added to the matrix before solving.",
+                    "You shortened the step of Gauss and Newton. How much λ shortens it depends on J, and with several unknowns λ mostly turns it as well: λ I is added to JᵀJ before solving.",
                     id="damped-shortened",
                 ),
                 Mistake(

@@ -3,6 +3,7 @@
 import functools
 
 import numpy as np
+from scipy.linalg import polar
 
 from ...calibration import hand_eye, literature
 from ...calibration.planning import poses_that_see
@@ -325,14 +326,13 @@ def _rotation(change):
     return variant
 
 
+def _orthonormal(X):
+    """The nearest orthogonal matrix, reflections included."""
+    return polar(X)[0]
+
+
 def _without_det(R, t, x):
-    U, _, Vt = np.linalg.svd(-(t @ R).T @ x)
-    return U @ Vt
-
-
-def _as_it_comes(X):
-    U, _, Vt = np.linalg.svd(X)
-    return U @ Vt
+    return _orthonormal(-(t @ R).T @ x)
 
 
 def _all_signs_turned(R, t, x):
@@ -1035,11 +1035,11 @@ LITERATURE = [
             *(
                 Mistake(
                     _rotation(lambda R, t, x, nearest=nearest: nearest(np.linalg.lstsq(x, -t @ R, rcond=None)[0].T)),
-                    "This is the rotation next to nine entries found by least squares. Where the moves lie nearly in a plane they tell little "
-                    "of one direction, and the rotation takes it over: sum the outer products instead, and take the rotation nearest to the sum.",
+                    "These are nine entries found by least squares, made orthonormal afterwards. Where the moves lie nearly in a plane they tell "
+                    "little of one direction, and noise decides it: sum the outer products instead, and take `nearest_rotation` of the sum.",
                     id=f"li-nine-entries-{words}",
                 )
-                for nearest, words in ((nearest_rotation, "turned"), (_as_it_comes, "as-it-comes"))
+                for nearest, words in ((nearest_rotation, "turned"), (_orthonormal, "as-it-comes"))
             ),
         ],
     ),

@@ -64,6 +64,13 @@ def measured_often(rng, n, m, k, sure=1.0):
     return x + sure**0.5 * rng.normal(size=n), covariance(rng, n, sure), z, C, cov_z
 
 
+def one_far_more_exact(rng, measured):
+    """The same where all measured numbers but one are a thousand times coarser."""
+    x, cov, z, C, cov_z = measured(rng)
+    coarser = rng.permutation([1.0, *np.full(len(C) - 1, 1e3)])
+    return x, cov, z, C, cov_z * np.outer(coarser, coarser)
+
+
 def measured_alike(rng):
     """The same where two of the measurements are equal."""
     x0, cov0, z, C, cov_z = measured_often(rng, n=2, m=2, k=4)
@@ -897,6 +904,7 @@ LANDMARK = "a landmark of the floor has two coordinates"
 READING = "a reading is a distance and a bearing"
 CONTROL = "the control is a speed and a turn rate"
 
+UNLIKE_SENSORS = "right, but not where one of the two measured numbers is a thousand times as exact as the other:"
 STATE_AND_COV = metrics.Several(metrics.Numbers(1e-8), metrics.Numbers(1e-8), names=("state", "covariance"))
 
 SMALL = metrics.Numbers(1e-8, least=0.0)
@@ -1090,6 +1098,11 @@ CHAPTER = Chapter(
                     functools.partial(mixed_measurement, n=3, m=2, off=1e6),
                     STATE_AND_COV,
                     "right, but not for a measurement that is a million off: however far, none is left out here:",
+                ),
+                (
+                    functools.partial(one_far_more_exact, measured=functools.partial(mixed_measurement, n=3, m=2)),
+                    STATE_AND_COV,
+                    UNLIKE_SENSORS,
                 ),
             ),
             hints=(
@@ -2743,6 +2756,11 @@ CHAPTER = Chapter(
                     functools.partial(measured_often, n=2, m=3, k=3),
                     STATE_AND_COV,
                     "right, but not for measurements of more numbers than there are states:",
+                ),
+                (
+                    functools.partial(one_far_more_exact, measured=functools.partial(measured_often, n=3, m=2, k=4)),
+                    STATE_AND_COV,
+                    UNLIKE_SENSORS,
                 ),
             ),
             hints=(
