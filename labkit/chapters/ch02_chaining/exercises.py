@@ -951,7 +951,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: 7.48,
-                    "At least one of the six axes in the table above is worse than that: look for the largest, and between the axes too.",
+                    "One of the six axes in the table above is worse than that, perhaps several are: look for the largest, and between the axes too.",
                     id="meter-below-the-axes",
                     within=7.48,  # up to the worst of the axes, 14.96 mm
                 ),
