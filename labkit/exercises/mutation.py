@@ -1316,12 +1316,12 @@ def _elsewhere(owner, field, block, i):
         return
     if len(here.body) > 1:
         out = ((here, "body", here.body[:-1]), (owner, field, [*block[: i + 1], here.body[-1], *block[i + 1 :]]))
-        mends = "this stands inside the loop, at its end, and belongs behind it"
+        mends = "this stands inside the loop, at its end; behind the loop it is right"
         yield Change("with one step of a loop behind it", mends, 1, here.body[-1], out)
     last = here.body[-1]
     if isinstance(last, ast.If) and last.orelse and isinstance(last.orelse[-1], ast.Return):
         out = ((last, "orelse", []), (owner, field, [*block[: i + 1], *last.orelse, *block[i + 1 :]]))
-        mends = "this ends the loop in its first round, and belongs behind it"
+        mends = "this ends the loop in its first round; behind the loop it is right"
         yield Change("with the last case of a loop behind it", mends, 1, last.orelse[-1], out)
     if behind is not None and not isinstance(behind, ast.Return):
         into = ((here, "body", [*here.body, behind]), (owner, field, [*block[: i + 1], *block[i + 2 :]]))

@@ -937,6 +937,9 @@ OF_A_PLACE_ALONE = [
         lambda a, w: particles.circular_mean(*(lambda i: (a[i], w[i]))(np.unique(a, return_index=True)[1])),
     ),
     ("circular_mean", lambda a, w: particles.circular_mean(a, w + 1e-20)),
+    ("circular_mean", lambda a, w: particles.circular_mean(a, w) if abs(w @ np.sin(a)) > 1e-9 * w.sum() else 0.0),
+    ("circular_mean", lambda a, w: np.sign(w @ np.sin(a)) * abs(particles.circular_mean(a, w))),
+    ("circular_mean", lambda a, w: 2 * np.arctan((abs(w @ np.exp(1j * a)) - w @ np.cos(a)) / (w @ np.sin(a)))),
 ]
 
 

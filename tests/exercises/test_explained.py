@@ -458,7 +458,7 @@ LOOPS = {
     ),
     "the first round ends it": (
         "for k in range(4):\n    if x[k] < 0:\n        return x[k] * std\n    else:\n        return std\n",
-        "`return std`: this ends the loop in its first round, and belongs behind it",
+        "`return std`: this ends the loop in its first round; behind the loop it is right",
     ),
     "entry by entry": ("M = np.outer(x, x) + np.eye(4)\nreturn (M * np.diag(x) * std)", "`*` stands where `@` belongs"),
     "a division that cuts": ("return 7 * std // 2 + x", "`//` stands where `/` belongs"),

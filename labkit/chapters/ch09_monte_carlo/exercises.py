@@ -608,6 +608,15 @@ def few_headings(rng, count):
     return angles[:count] + 2 * math.pi * rng.integers(-4, 5, count), 1e-100 * (weights[:count] + 0.1)
 
 
+def headings_mirrored(rng, about):
+    """Two angles of one weight, as far to the left as to the right of 0 or of pi: their sines cancel exactly.
+
+    With a power of two as the weight no product is rounded, so that they do whether or not the processor fuses a sum.
+    """
+    angle, weight = about - rng.uniform(0.1, 1.2), 2.0 ** rng.integers(-3, 4)
+    return np.array([angle, -angle]), np.array([weight, weight])
+
+
 def headings_alike(rng):
     """The same with angles that several particles share, each of a weight of its own."""
     angles, weights = headings(rng, about=2.0)
@@ -1556,13 +1565,13 @@ def _spins_are_independent(resample, rng):
         return f"with 10 equal weights: {counts}."
     variance = float(counts.var(0).mean())
     if variance < 0.9 - VARIES:
-        return f"a count varies by {variance:.2f} instead of 0.9 (variance of a binomial): {EACH_SPIN}."
+        return f"with 10 equal weights a count varies by {variance:.2f} instead of 0.9 (variance of a binomial): {EACH_SPIN}."
     if variance > 0.9 + VARIES:
-        return f"some spins go together: a count varies by {variance:.2f} instead of 0.9 (variance of a binomial): {EACH_SPIN}."
+        return f"some spins go together: with 10 equal weights a count varies by {variance:.2f} instead of 0.9 (variance of a binomial): {EACH_SPIN}."
     half = float(counts[:, :5].sum(1).var())
     if half < HALF_VARIES:
         return (
-            f"the draws from one half of the wheel vary by {half:.1f} instead of 2.5: {EACH_SPIN}. Does each spin start "
+            f"with 10 equal weights the draws from one half of the wheel vary by {half:.1f} instead of 2.5: {EACH_SPIN}. Does each spin start "
             "where the last one ended?"
         )
     return None
@@ -3386,6 +3395,14 @@ CHAPTER = Chapter(
                 ),
                 (headings_without_weight, metrics.Angles(1e-9), "right, but not where some angles weigh nothing:"),
                 (headings_alike, metrics.Angles(1e-9), "right, but not where several angles are the same:"),
+                *(
+                    (
+                        functools.partial(headings_mirrored, about=math.radians(degrees)),
+                        metrics.Angles(1e-9),
+                        f"right, but not where the mean direction is exactly {degrees} deg:",
+                    )
+                    for degrees in (0, 180)
+                ),
             ),
             hints=(
                 "The mean of 179 deg and -179 deg should be 180 deg. What could be averaged instead of angles?",
