@@ -2,8 +2,8 @@
 
 Loaded as `-p tests.memory_of_kernels` by `run.py`; costs nothing, for the kernel is there anyway. The figures hold for
 Linux and Python 3.11, where they were taken (docs/hub.md); elsewhere the test is skipped and says what it found.
-Asked is what a kernel holds of its own. Beside it lie pages of files, 45 to 55 MiB, that kernels share: how many of them
-count as resident is the system's choice, and differs by 8 MiB between two runs on one machine.
+Asked is what a kernel holds of its own. Beside it lie pages of files, 45 to 55 MiB, that kernels share: how many of
+them count as resident is the system's choice, and differs by 8 MiB between two runs on one machine.
 """
 
 import os
@@ -18,8 +18,9 @@ MEASURED = sys.platform == "linux" and sys.version_info[:2] == (3, 11)
 
 
 def memory(pid):
-    """(resident, proportional, own) memory of a process, MiB; proportional counts once what several processes share, own
-    leaves the pages of files out.
+    """(resident, proportional, own) memory of a process, MiB.
+
+    In the second what several processes share counts once, in the third no page of a file does.
     """
     rollup = dict(line.split(":") for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()[1:])
     return tuple(int(rollup[name].split()[0]) // 1024 for name in ("Rss", "Pss", "Anonymous"))

@@ -17,6 +17,7 @@ from . import guard, metrics, scope
 from .again import Again
 from .evidence import MORE_CASES
 from .outcome import CORRECT, NOT_YET, TO_DO, Item, Outcome, is_blank
+from .sizes import right_in_all_sizes
 from .trial import Trial
 from .whole import WholeNumbers
 from .wording import NOISY, closed
@@ -40,6 +41,7 @@ class Exercise(Item):
     fixed:      {argument: reason} of arguments that are the same, or of one shape, in all draws: what the docstring
                 leaves free must vary, or an answer could be wired to it.
     decimals:   {argument: reason} of arguments that nobody has to take in whole numbers.
+    sizes:      arguments that may be of any size, as a check asks as well; those in one string change together.
     draws:      how many draws a check takes; 0 where the properties alone judge.
     limit:      seconds that one call may take.
     about:      function(result, *arguments) -> what is true of a wrong result that nothing else explains, in a sentence
@@ -55,6 +57,7 @@ class Exercise(Item):
     properties: tuple = ()
     fixed: dict = field(default_factory=dict)
     decimals: dict = field(default_factory=dict)
+    sizes: tuple = ()
     draws: int = 5
     limit: float = guard.TIME_LIMIT
     about: object = None
@@ -90,6 +93,11 @@ class Exercise(Item):
     def whole(self):
         """The property that whole numbers are numbers, too."""
         return WholeNumbers(self)
+
+    @functools.cached_property
+    def in_all_sizes(self):
+        """The property that arguments may be far larger or smaller than others."""
+        return right_in_all_sizes(self)
 
     @property
     def arguments(self):
@@ -127,7 +135,7 @@ class Exercise(Item):
         if verdict.status == CORRECT:
             if words := trial.repeated() or trial.remembered(rng):
                 return trial.outcome(NOT_YET, closed(words))
-            for holds in (*self.properties, self.whole):
+            for holds in (*self.properties, self.whole, self.in_all_sizes):
                 problem = trial.property(holds, rng)
                 if problem:
                     return problem

@@ -22,7 +22,8 @@ def right_where(reference, metric, *places):
     reference : function
     metric : Metric
     places : (str, function)
-        What is special, as it follows "right so far, but not ", and a draw of a random generator: arguments.
+        What is special, as it follows "right so far, but not ", and a draw of a random generator: arguments, or None
+        where nothing can be asked.
 
     Returns
     -------
@@ -35,7 +36,8 @@ def right_where(reference, metric, *places):
         for words, draw in places:
             if seconds() - began > LONGEST:
                 return None
-            told = _told(student, draw(rng), reference, metric)
+            args = draw(rng)
+            told = args and _told(student, args, reference, metric)
             if told:
                 return f"right so far, but not {words}: {told}."
         return None

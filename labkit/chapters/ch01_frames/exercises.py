@@ -585,6 +585,7 @@ CHAPTER = Chapter(
         Exercise(
             "normalize",
             reference=frames.unit_vector,
+            sizes=("v",),
             draw=tuple(functools.partial(scaled_direction, scale=s) for s in (1.0, 1e-9, 1e3, 1e-4)),
             fixed={"v": POINT},
             metric=metrics.Numbers(1e-9),
@@ -672,6 +673,7 @@ CHAPTER = Chapter(
         Exercise(
             "gram_schmidt",
             reference=frames.gram_schmidt,
+            sizes=("a", "b"),
             draw=either_angle(two_directions),
             fixed={"a": POINT, "b": POINT},
             metric=metrics.Rotations(1e-7),
@@ -773,6 +775,7 @@ CHAPTER = Chapter(
         Exercise(
             "frame_from_points",
             reference=frames.frame_from_points,
+            sizes=("origin", "x_point", "y_point"),
             draw=either_angle(three_points),
             fixed={"origin": POINT, "x_point": POINT, "y_point": POINT},
             metric=metrics.Poses(1e-6, 1e-6),
@@ -847,6 +850,7 @@ CHAPTER = Chapter(
         Exercise(
             "invert",
             reference=frames.invert,
+            sizes=("T",),
             draw=lambda rng: (random_pose(rng),),
             fixed={"T": POSE},
             metric=metrics.Poses(1e-6, 1e-6),
@@ -922,6 +926,7 @@ CHAPTER = Chapter(
         Exercise(
             "relative",
             reference=frames.relative,
+            sizes=("T_WA", "T_WB"),
             draw=lambda rng: (random_pose(rng), random_pose(rng)),
             fixed={"T_WA": POSE, "T_WB": POSE},
             metric=metrics.Poses(1e-6, 1e-6),
@@ -1335,6 +1340,7 @@ CHAPTER = Chapter(
         Exercise(
             "kuka_from_matrix",
             reference=frames.kuka_from_matrix,
+            sizes=("T",),
             draw=tuple(
                 lambda rng, ranges=ranges: (frames.matrix_from_kuka(kuka_pose(rng, *ranges)[0]),)
                 for ranges in zip(A_RANGES, B_RANGES, C_RANGES)

@@ -475,6 +475,7 @@ CHAPTER = Chapter(
         Exercise(
             "chain",
             reference=chain,
+            sizes=("transforms",),
             draw=tuple(functools.partial(random_links, count=n) for n in (3, 2, 9, 4, 6)),
             metric=metrics.Poses(1e-6, 1e-6),
             noisy=(
@@ -596,6 +597,7 @@ CHAPTER = Chapter(
         Exercise(
             "closure_error",
             reference=chaining.closure_error,
+            sizes=("T",),
             draw=tuple(functools.partial(loop_product, between_deg=between) for between in (SMALL, LARGE)),
             fixed={"T": ONE_POSE},
             metric=CLOSURE,
@@ -980,6 +982,7 @@ CHAPTER = Chapter(
         Exercise(
             "orthonormalize",
             reference=chaining.orthonormalize,
+            sizes=("T",),
             draw=(worn_pose, stretched_pose),
             fixed={"T": ONE_POSE},
             decimals={"T": "a copy of it is asked for, and that of whole numbers holds whole numbers"},
@@ -1118,6 +1121,7 @@ CHAPTER = Chapter(
         Exercise(
             "distribute_closure",
             reference=chaining.distribute_closure,
+            sizes=("transforms",),
             draw=tuple(functools.partial(open_loop, count=n) for n in (3, 4, 7)),
             metric=metrics.Poses(1e-5, 1e-5),
             noisy=[

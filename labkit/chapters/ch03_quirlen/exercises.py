@@ -239,6 +239,7 @@ CHAPTER = Chapter(
         Exercise(
             "pivot_matrix",
             reference=pivot.pivot_matrix,
+            sizes=("T_WF",),
             draw=lambda rng: (poses(rng),),
             metric=metrics.Numbers(1e-9),
             noisy=of_few(metrics.Numbers(1e-9)),
@@ -349,6 +350,7 @@ CHAPTER = Chapter(
         Exercise(
             "pivot_rhs",
             reference=pivot.pivot_rhs,
+            sizes=("T_WF",),
             draw=lambda rng: (poses(rng),),
             metric=metrics.Numbers(1e-9, "mm"),
             noisy=of_few(metrics.Numbers(1e-9, "mm")),
@@ -640,6 +642,7 @@ CHAPTER = Chapter(
         Exercise(
             "pivot_residuals",
             reference=lambda T_WF, tip, point: pivot.pivot_residuals(T_WF, tip, point),
+            sizes=("T_WF", "tip", "point"),
             draw=poses_and_result,
             fixed={"tip": "a point has three coordinates", "point": "a point has three coordinates"},
             metric=metrics.Numbers(1e-9, "mm"),
@@ -852,6 +855,7 @@ CHAPTER = Chapter(
         Exercise(
             "pivot_covariance",
             reference=pivot.pivot_covariance,
+            sizes=("residuals",),
             draw=matrix_and_residuals,
             metric=metrics.Numbers(1e-6, "mm^2"),
             noisy=(
@@ -1002,6 +1006,7 @@ CHAPTER = Chapter(
         Exercise(
             "robust_weights",
             reference=_tukey_weights,
+            sizes=("distances scale", "distances", "scale"),
             draw=tuple(functools.partial(draw, count=n) for n in (11, 6) for draw in (near_first, far_first)),
             metric=metrics.Numbers(1e-9),
             properties=(right_where(_tukey_weights, metrics.Numbers(1e-9), *special.DISTANCES),),

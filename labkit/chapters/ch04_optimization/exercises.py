@@ -1118,6 +1118,7 @@ CHAPTER = Chapter(
         Exercise(
             "classify_extremum",
             reference=classify_extremum,
+            sizes=("g", "H"),
             draw=KINDS,
             metric=metrics.Exactly(),
             noisy=[
@@ -1274,6 +1275,7 @@ CHAPTER = Chapter(
         Exercise(
             "newton_step",
             reference=opt.newton_step,
+            sizes=("g", "H"),
             draw=MODELS,
             fixed={"g": TWO, "H": TWO},
             metric=metrics.Numbers(1e-9),
@@ -1565,6 +1567,7 @@ CHAPTER = Chapter(
         Exercise(
             "jacobian",
             reference=wells.jacobian,
+            sizes=("x",),
             draw=PLACES,
             fixed={"x": TWO},
             metric=metrics.Numbers(1e-6),
@@ -1694,6 +1697,7 @@ CHAPTER = Chapter(
         Exercise(
             "damped_step",
             reference=opt.damped_step,
+            sizes=("r", "J", "damping"),
             draw=DAMPED,
             metric=metrics.Numbers(1e-7),
             noisy=[
@@ -1817,6 +1821,7 @@ CHAPTER = Chapter(
         Exercise(
             "gain_ratio",
             reference=opt.gain_ratio,
+            sizes=("cost new_cost", "g", "B", "step"),
             draw=TRIED_STEPS,
             fixed={"g": TWO, "B": TWO, "step": TWO},
             metric=metrics.Numbers(1e-8),
@@ -1933,6 +1938,7 @@ CHAPTER = Chapter(
         Exercise(
             "dogleg_step",
             reference=opt.dogleg_step,
+            sizes=("g", "B", "radius"),
             draw=DOGLEG_CASES,
             metric=metrics.Numbers(1e-8),
             noisy=[

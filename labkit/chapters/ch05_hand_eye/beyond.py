@@ -399,6 +399,7 @@ ACCURACY = [
     Exercise(
         "position_accuracy",
         reference=robot_accuracy.position_accuracy,
+        sizes=("command reached",),
         draw=(
             arrivals,
             functools.partial(arrivals, d=2),
@@ -493,6 +494,7 @@ ACCURACY = [
     Exercise(
         "repeatability",
         reference=robot_accuracy.repeatability,
+        sizes=("reached",),
         draw=(only_arrivals, functools.partial(only_arrivals, d=2), functools.partial(only_arrivals, numbers=(3, 4))),
         metric=metrics.Numbers(1e-9, "mm"),
         noisy=(
@@ -665,6 +667,7 @@ TRIANGULATION = [
     Exercise(
         "height_from_angles",
         reference=triangulation.height_from_angles,
+        sizes=("base",),
         draw=(
             triangle,
             functools.partial(triangle, right_angle=True),
@@ -769,6 +772,7 @@ TRIANGULATION = [
     Exercise(
         "height_std",
         reference=triangulation.height_std,
+        sizes=("base", "std"),
         draw=(
             noisy_triangle,
             noisy_right_triangle,

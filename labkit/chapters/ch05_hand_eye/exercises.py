@@ -1103,6 +1103,7 @@ CHAPTER = Chapter(
         Exercise(
             "kuka_residual",
             reference=lambda p2, T_BF, x_S, target: _residual(frames.matrix_from_kuka(p2), T_BF, x_S, target),
+            sizes=("T_BF", "x_S", "target"),
             draw=tuple(functools.partial(kuka_scene, n=n) for n in COUNTS),
             fixed={"p2": "a KUKA pose is always six numbers", "target": POINT},
             metric=metrics.Numbers(1e-9, "mm"),
@@ -1242,6 +1243,7 @@ CHAPTER = Chapter(
         Exercise(
             "analytic_jacobian",
             reference=analytic_jacobian,
+            sizes=("T_FS", "T_BF", "x_S"),
             draw=tuple(lambda rng, n=n: pose_off(rng, n)[:3] for n in COUNTS),
             fixed={"T_FS": POSE},
             metric=metrics.Numbers(1e-6),  # good differences are right as well
@@ -1360,6 +1362,7 @@ CHAPTER = Chapter(
         Exercise(
             "joint_residual",
             reference=joint_residual,
+            sizes=("T0", "T_BF", "x_S"),
             draw=tuple(functools.partial(increments, n=n) for n in COUNTS),
             noisy=(
                 (functools.partial(increments, turn=0.0), metrics.Numbers(1e-9, "mm"),
@@ -1447,6 +1450,7 @@ CHAPTER = Chapter(
         Exercise(
             "robust_weights",
             reference=robust_weights,
+            sizes=("residuals",),
             draw=(residuals_with_outliers, functools.partial(residuals_with_outliers, odd=1), residuals_of_all_lengths),
             metric=metrics.Numbers(1e-3),  # the printed 1.538 is good enough
             noisy=tuple((draw, metrics.Numbers(1e-3), words) for draw, words in SPECIAL_RESIDUALS),

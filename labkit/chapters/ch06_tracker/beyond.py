@@ -651,6 +651,7 @@ STATIONS = [
     Exercise(
         "nearest_to_rays",
         reference=stations.nearest_to_rays,
+        sizes=("origins",),
         draw=tuple(functools.partial(rays, most=most) for most in (6, 2, 3)),
         metric=metrics.Numbers(1e-6, "mm"),
         noisy=(
@@ -888,6 +889,7 @@ CELL = [
     Exercise(
         "moved_part",
         reference=cell.moved_part,
+        sizes=("T_BW", "T_WE0", "T_WE1", "T_BP0"),
         draw=trolley,
         metric=metrics.Poses(1e-6, 1e-6),
         noisy=(
@@ -1006,6 +1008,7 @@ CELL = [
     Exercise(
         "point_covariance",
         reference=point_covariance,
+        sizes=("cov_AB", "p_B", "cov_B"),
         draw=uncertain_point,
         metric=metrics.Numbers(1e-6, "mm^2"),
         noisy=tuple(

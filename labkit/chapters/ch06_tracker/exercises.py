@@ -842,6 +842,7 @@ CHAPTER = Chapter(
         Exercise(
             "dh_matrix",
             reference=dh_matrix,
+            sizes=("d", "a"),
             draw=(
                 *(
                     functools.partial(link, signs=s)
@@ -1123,6 +1124,7 @@ CHAPTER = Chapter(
         Exercise(
             "rotation_from_nullvector",
             reference=rotation_from_nullvector,
+            sizes=("M",),
             draw=(*ALL_SIGNS, gentle_turn),
             metric=metrics.Rotations(1e-5),
             noisy=(
@@ -1270,6 +1272,7 @@ CHAPTER = Chapter(
         Exercise(
             "singular_value_ratio",
             reference=singular_value_ratio,
+            sizes=("M",),
             draw=(stacks, functools.partial(stacks, n=2)),
             metric=metrics.Numbers(1e-9),
             noisy=(
@@ -1345,6 +1348,7 @@ CHAPTER = Chapter(
         Exercise(
             "translation_lsq",
             reference=translation_lsq,
+            sizes=("A", "B"),
             draw=tuple(functools.partial(translation_problem, n=n) for n in (None, 3, 25)),
             fixed={"R": "a rotation is always 3 x 3"},
             metric=metrics.Numbers(1e-7, "mm"),
@@ -1560,6 +1564,7 @@ CHAPTER = Chapter(
         Exercise(
             "e_trans",
             reference=e_trans,
+            sizes=("residuals",),
             draw=(gaps, functools.partial(gaps, n=3), functools.partial(gaps, n=25)),
             metric=metrics.Numbers(1e-9, "mm"),
             noisy=(
@@ -1642,6 +1647,7 @@ CHAPTER = Chapter(
         Exercise(
             "reject_outliers",
             reference=reject_outliers,
+            sizes=("values",),
             draw=tuple(functools.partial(spoiled, factor=factor) for factor in (4.0, 3.0, 5.0)),
             metric=KeptOrNot(),
             noisy=(

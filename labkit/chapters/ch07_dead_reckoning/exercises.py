@@ -832,6 +832,7 @@ CHAPTER = Chapter(
         Exercise(
             "lateration_residual",
             reference=lateration_residual,
+            sizes=("landmarks", "distances", "position"),
             draw=tuple(functools.partial(several_circles, n=n) for n in (3, 5, 2, 4)),
             fixed={"position": "a place in the plane"},
             metric=metrics.Numbers(1e-9),
@@ -1094,6 +1095,7 @@ CHAPTER = Chapter(
         Exercise(
             "wheel_to_twist",
             reference=odometry.wheel_to_twist,
+            sizes=("v_left", "v_right", "track"),
             draw=WHEELS,
             metric=metrics.Numbers(1e-9),
             noisy=(
@@ -1206,6 +1208,7 @@ CHAPTER = Chapter(
         Exercise(
             "step_euler",
             reference=step_euler,
+            sizes=("u", "dt"),
             draw=STEPS,
             fixed=PLANAR,
             metric=metrics.PlanarPoses(),
@@ -1245,6 +1248,7 @@ CHAPTER = Chapter(
         Exercise(
             "step_midpoint",
             reference=step_midpoint,
+            sizes=("u", "dt"),
             draw=STEPS,
             fixed=PLANAR,
             metric=metrics.PlanarPoses(),
@@ -1437,6 +1441,7 @@ CHAPTER = Chapter(
         Exercise(
             "jacobian_state",
             reference=jacobian_state,
+            sizes=("u", "dt"),
             draw=EITHER_WAY,
             fixed=PLANAR,
             metric=metrics.Numbers(1e-5),
@@ -1531,6 +1536,7 @@ CHAPTER = Chapter(
         Exercise(
             "jacobian_control",
             reference=jacobian_control,
+            sizes=("u", "dt"),
             draw=EITHER_WAY,
             fixed=PLANAR,
             metric=metrics.Numbers(1e-5),
@@ -1610,6 +1616,7 @@ CHAPTER = Chapter(
         Exercise(
             "control_covariance",
             reference=odometry.control_covariance,
+            sizes=("u", "dt", "k_d", "k_theta", "k_drift"),
             draw=NOISY_CONTROLS,
             fixed={"u": PLANAR["u"]},
             metric=metrics.Numbers(1e-9),
@@ -1762,6 +1769,7 @@ CHAPTER = Chapter(
         Exercise(
             "propagate",
             reference=propagate,
+            sizes=("cov", "u", "dt", "cov_u"),
             draw=tuple(functools.partial(pose_and_covariances, side=s, gear=g) for g in (1, -1) for s in (1, -1)),
             fixed=PLANAR | {"cov": "the covariance of a planar pose", "cov_u": "the covariance of v and omega"},
             metric=POSE_AND_COV,
@@ -2053,6 +2061,7 @@ CHAPTER = Chapter(
         Exercise(
             "wheel_offset",
             reference=wheel_offset,
+            sizes=("way", "track"),
             draw=UNEQUAL,
             metric=metrics.Numbers(1e-6, "m"),
             noisy=(
@@ -2171,6 +2180,7 @@ CHAPTER = Chapter(
         Exercise(
             "ackermann_twist",
             reference=ackermann_twist,
+            sizes=("speed", "wheelbase"),
             draw=CARS,
             metric=metrics.Numbers(1e-9),
             noisy=(
@@ -2286,6 +2296,7 @@ CHAPTER = Chapter(
         Exercise(
             "mecanum_twist",
             reference=mecanum_twist,
+            sizes=("speeds", "half_length half_width"),
             draw=(rolling, functools.partial(rolling, wide=False)),
             noisy=(
                 (rolling_slowly, metrics.Numbers(1e-9), "right, but not for a robot that hardly moves, a few cm/s:"),

@@ -922,6 +922,7 @@ CHAPTER = Chapter(
         Exercise(
             "predict_state",
             reference=predict_state,
+            sizes=("x", "cov", "A", "B", "u", "cov_u"),
             draw=(
                 vehicle_prediction,
                 functools.partial(prediction, n=3, k=2),
@@ -1071,6 +1072,7 @@ CHAPTER = Chapter(
         Exercise(
             "update",
             reference=update,
+            sizes=("x", "cov", "z", "C", "cov_z"),
             draw=tuple(
                 functools.partial(mixed_measurement, n=n, m=m, off=off, sure=sure, unit=unit)
                 for n, m, off, sure, unit in (
@@ -1297,6 +1299,7 @@ CHAPTER = Chapter(
         Exercise(
             "fuse_two_sensors",
             reference=fuse_two_sensors,
+            sizes=("x0", "var0", "z", "stds"),
             draw=(
                 one_position_two_sensors,
                 functools.partial(one_position_two_sensors, better=1),
@@ -1875,6 +1878,7 @@ CHAPTER = Chapter(
         Exercise(
             "measurement",
             reference=measurement,
+            sizes=("landmark",),
             draw=(*each_way(landmark_aside, "side", "turned"), turned_several_times),
             fixed={"x": POSE, "landmark": LANDMARK},
             draws=12,
@@ -2019,6 +2023,7 @@ CHAPTER = Chapter(
         Exercise(
             "measurement_jacobian",
             reference=measurement_jacobian,
+            sizes=("landmark",),
             draw=seen_landmark,
             fixed={"x": POSE, "landmark": LANDMARK},
             metric=metrics.Numbers(1e-5),
@@ -2152,6 +2157,7 @@ CHAPTER = Chapter(
         Exercise(
             "motion_jacobians",
             reference=motion_jacobians,
+            sizes=("u", "dt"),
             draw=each_way(pose_control_step, "ahead"),
             fixed={"x": POSE, "u": CONTROL},
             metric=JACOBIANS,
@@ -2284,6 +2290,7 @@ CHAPTER = Chapter(
         Exercise(
             "ekf_step",
             reference=ekf_step,
+            sizes=("cov", "u", "dt", "cov_u", "cov_z"),
             draw=(
                 filter_step,
                 functools.partial(filter_step, ahead=-1, side=-1),
@@ -2519,6 +2526,7 @@ CHAPTER = Chapter(
         Exercise(
             "nees",
             reference=nees,
+            sizes=("cov",),
             draw=(
                 *each_way(estimate_and_truth, "side"),
                 functools.partial(estimate_and_truth, astray=50.0),
@@ -2647,6 +2655,7 @@ CHAPTER = Chapter(
         Exercise(
             "gate",
             reference=gate,
+            sizes=("innovation", "cov_innovation", "limit"),
             draw=SURPRISES,
             metric=metrics.Exactly(),
             properties=(_limit_passes_not,),
@@ -2734,6 +2743,7 @@ CHAPTER = Chapter(
         Exercise(
             "batch_estimate",
             reference=batch_estimate,
+            sizes=("x0", "z"),
             draw=tuple(
                 functools.partial(measured_often, n=n, m=m, k=k, sure=sure)
                 for n, m, k, sure in ((2, 1, 9, 1.0), (3, 2, 3, 100.0), (2, 2, 6, 1e-3))

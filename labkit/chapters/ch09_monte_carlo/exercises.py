@@ -2504,6 +2504,7 @@ CHAPTER = Chapter(
         Exercise(
             "log_sum_exp",
             reference=log_sum_exp,
+            sizes=("log_weights",),
             draw=LOG_WEIGHTS,
             metric=metrics.Numbers(1e-9),
             noisy=tuple(
@@ -3142,6 +3143,7 @@ CHAPTER = Chapter(
         Exercise(
             "effective_size",
             reference=particles.effective_size,
+            sizes=("weights",),
             draw=cloud_weights,
             metric=metrics.Numbers(1e-9),
             noisy=(
@@ -3382,6 +3384,7 @@ CHAPTER = Chapter(
         Exercise(
             "circular_mean",
             reference=circular_mean,
+            sizes=("weights",),
             draw=(headings, *(functools.partial(headings, about=about) for about in (0.0, 2.0, -2.0))),
             metric=metrics.Angles(1e-9),
             noisy=(

@@ -596,6 +596,12 @@ def printed_twice(rng):
             return entries, average
 
 
+def of_another_sign(rng):
+    """A column, of negative numbers or of positive ones, whose average has the sign of the others."""
+    sign, values = rng.choice([-1, 1]), np.round(rng.uniform(20, 60, 4), 1)
+    return [f"{sign * value:.1f}" for value in values], f"{-sign * values.mean():.3f}"
+
+
 def _like_the_average(rng):
     """Entries of which one, with a slip in it, is printed like the average, which all others are to agree with."""
     while True:
@@ -717,6 +723,12 @@ def _without_signs_agrees(entries, average):
     slack = sum(map(half_unit, entries)) / len(entries) + half_unit(average)
     mean = sum(abs(number(text)) for text in entries) / len(entries)
     return abs(mean - number(average)) <= slack * (1 + 1e-9) + 1e-12
+
+
+def _magnitudes_agree(entries, average):
+    slack = sum(map(half_unit, entries)) / len(entries) + half_unit(average)
+    gap = abs(sum(map(number, entries)) / len(entries)) - abs(number(average))
+    return abs(gap) <= slack * (1 + 1e-9) + 1e-12
 
 
 def _first_half_as_printed(entries, average):
@@ -906,6 +918,7 @@ SUSPECTS = Exercise(
         (functools.partial(_clear, draw=draw), metrics.Exactly(), words)
         for draw, words in (
             (printed_twice, "right for entries that all differ, but not where two of them are printed alike:"),
+            (of_another_sign, "right, but not where mean and average differ by their sign:"),
             (of_two_slips, "right where a slip explains it, but not where none does, so that nobody is named:"),
             (
                 functools.partial(other_columns, kind="many"),
@@ -938,6 +951,11 @@ SUSPECTS = Exercise(
                 "take its absolute value.",
             )
             for sign in (1, -1)
+        ),
+        Mistake(
+            _search(agree=_magnitudes_agree),
+            "You compare mean and average without their signs, so that -40 agrees with 40. Take the absolute value of "
+            "their difference alone.",
         ),
         Mistake(
             lambda entries, average: found if len(found := suspects(entries, average)) == 1 else set(),

@@ -518,6 +518,7 @@ CHAPTER = Chapter(
         Exercise(
             "motions",
             reference=motion.motions,
+            sizes=("T_BF", "T_ST"),
             draw=rows_of_a_cell,
             metric=MOTIONS,
             noisy=[
@@ -695,6 +696,7 @@ CHAPTER = Chapter(
         Exercise(
             "left_out",
             reference=left_out,
+            sizes=("r",),
             draw=fitted_line,
             metric=metrics.Numbers(1e-7),
             noisy=[
@@ -755,6 +757,7 @@ CHAPTER = Chapter(
         Exercise(
             "honest_covariance",
             reference=honest_covariance,
+            sizes=("r",),
             draw=(functools.partial(fitted_line, freedom=(4, 4)), fitted_line),
             metric=metrics.Numbers(1e-8, least=0.0),
             noisy=[
@@ -814,6 +817,7 @@ CHAPTER = Chapter(
         Exercise(
             "with_one_more",
             reference=with_one_more,
+            sizes=("C", "J"),
             draw=covariance_and_reading,
             metric=metrics.Numbers(1e-7),
             noisy=[
@@ -931,6 +935,7 @@ CHAPTER = Chapter(
         Exercise(
             "visible",
             reference=visible,
+            sizes=("J", "std"),
             draw=shares_of_a_fit,
             metric=metrics.Numbers(1e-8),
             noisy=[
