@@ -65,7 +65,7 @@ def lateration_residual(landmarks, distances, position):
 
 # %% newton [markdown]
 # Newton's method replaces $f$ by its tangent planes, goes to where they vanish, and starts again from there:
-# $J\,\Delta = -f$, $x \leftarrow x + \Delta$. Row $i$ of $J$ is $2\,(x - l_i)^\top$. Twenty rounds are plenty.
+# $J\,\Delta = -f$, $x \leftarrow x + \Delta$. Row $i$ of $J$ is $2\,(x - l_i)^\top$. Twenty rounds are plenty, unless the start lies almost on the line through the landmarks.
 
 # %% newton_lateration
 @ex.newton_lateration
@@ -299,7 +299,7 @@ end_cov = ex.end_cov(end_cov)
 #
 # $k_d$ has the unit m²/m. That is why it survives a change of the time step: cut the same 14 s into other steps and the end stays as uncertain. A speed noise that
 # is *constant per step*, a frequent shortcut, promises more the finer you cut. Compare the heading, and mind the last column. (`drive_with_covariance` takes midpoint steps, so
-# the drive ends elsewhere than yours above; the uncertainty is the same to the printed digits.)
+# the drive ends elsewhere than yours above; what is printed of the uncertainty is the same.)
 
 # %% what-k-means-code
 for dt in (0.5, 0.1, 0.02):
@@ -351,7 +351,8 @@ print(f"mean of the ends lags behind: {100 * (poses[-1] - ends.mean(0))[0]:.0f} 
 # ## Wheels that are not alike (*further*)
 #
 # The right wheel is a little larger than the software believes, by `excess` (0.01 is 1 %).
-# The robot counts its way straight on, by the believed radius, and really drives a circle.
+# Both wheels count the same way, by the believed radius, as on a straight line; really the robot
+# drives a circle.
 # **How far to the left does it end?** Write the exact answer, then compare: a drift of the
 # lecture's kind and a wheel 1 % too large, after 2, 14 and 50 m.
 
@@ -414,7 +415,7 @@ def ackermann_twist(speed, steering, wheelbase):
 # w_\mathrm{RR} &= v_x - v_y + (a + b)\,\omega .
 # \end{aligned}$$
 #
-# Turn it around. The wheels slip, so four measured numbers hardly fit exactly: take what fits best.
+# Turn it around. The wheels slip, so four measured numbers hardly fit exactly: take what fits best, by least squares.
 
 # %% mecanum_twist
 @ex.mecanum_twist
