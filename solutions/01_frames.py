@@ -192,7 +192,7 @@ angle_deg = np.rad2deg(np.arccos((np.trace(T_K0K1[:3, :3]) - 1) / 2))
 angle_deg = ex.angle_deg(angle_deg)
 
 # %% half-a-degree [markdown]
-# Is that much? A hole is to be drilled at $(200, 0, 0)$ mm in $K_1$. In the drawing $K_1$ has the same origin and is turned by exactly 90°: that is `drawn` below.
+# Is that much? A hole is to be drilled at $(200, 0, 0)$ mm in $K_1$. In the drawing $K_1$ stands at the same place as here and is turned by exactly 90° against $K_0$: that is `drawn` below.
 # **How far from its place in the drawing does the hole land?** Guess first, from the angle.
 
 # %% distance
@@ -295,19 +295,19 @@ def kuka_from_matrix(T):
 # %% conventions [markdown]
 # ## What a wrong convention costs
 #
-# A tool tip sits 200 mm in front of the flange. Read one and the same displayed pose with four conventions and look where the tip ends up. None of the
-# wrong ones raises an error: only the millimeters tell.
+# A tool tip sits 200 mm in front of the flange. Read one and the same displayed pose with four wrong conventions and look where the tip ends up. None of
+# them raises an error: only the millimeters tell.
 
 # %% wrong-conventions
-displayed = np.array([800.0, 200.0, 500.0, 30.0, -40.0, 65.0])
-x, A, B, C = displayed[:3], *displayed[3:]
+pose_deg = np.array([800.0, 200.0, 500.0, 30.0, -40.0, 65.0])
+x, A_deg, B_deg, C_deg = pose_deg[:3], *pose_deg[3:]
 tip_F = np.array([0.0, 0.0, 200.0])
-right = frames.transform(matrix_from_kuka(frames.kuka_from_degrees(displayed)), tip_F)
+right = frames.transform(matrix_from_kuka(frames.kuka_from_degrees(pose_deg)), tip_F)
 readings = {
-    "A, B, C about x, y, z": frames.kuka_from_degrees([*x, C, B, A]),
-    "signs reversed": frames.kuka_from_degrees([*x, -A, -B, -C]),
-    "A and B swapped": frames.kuka_from_degrees([*x, B, A, C]),
-    "degrees taken for radians": displayed,
+    "A, B, C about x, y, z": frames.kuka_from_degrees([*x, C_deg, B_deg, A_deg]),
+    "signs reversed": frames.kuka_from_degrees([*x, -A_deg, -B_deg, -C_deg]),
+    "A and B swapped": frames.kuka_from_degrees([*x, B_deg, A_deg, C_deg]),
+    "degrees taken for radians": pose_deg,
 }
 for name, pose in readings.items():
     error = np.linalg.norm(frames.transform(matrix_from_kuka(pose), tip_F) - right)
@@ -332,7 +332,7 @@ for y_point in (np.array([50.0, 1e-4, 0]), o, np.array([50.0, np.nan, 0]),
 # ## Beyond the document: trust all points alike (*further*)
 #
 # If the drawing of the part says where the three points *should* be, the best frame minimizes the sum of squared distances. The SVD solves it in one step (Kabsch,
-# `frames.fit_frame`). Noise limits every method: how far an unbiased one can get depends only on how widely the points lie around each axis, that is, on the sum of their squared distances from it.
+# `frames.fit_frame`). Noise limits every method: how far an unbiased one can get with it depends only on how widely the points lie around each axis, that is, on the sum of their squared distances from it.
 # The black bars in the figure show this bound. Gram-Schmidt does not use the drawing. How much does it lose?
 
 # %% predict-svd
@@ -345,7 +345,7 @@ ex.predict("svd", guess, reveal=stages.svd_against_gram_schmidt)
 # %% kabsch [markdown]
 # Five lines do it. With the points $p_i$ in F and $q_i$ in W, both measured from their means,
 # the rotation that turns the $p_i$ best onto the $q_i$ follows from the SVD $\sum p_i q_i^\top = U S V^\top$ as
-# $R = V U^\top$; where that is a mirror image, the last column of $V$ changes its sign.
+# $R = V U^\top$; where that is a mirror image, the last column of $V$ changes its sign. The translation takes one mean to the other.
 
 # %% fit_frame
 @ex.fit_frame
@@ -366,7 +366,7 @@ def fit_frame(points_F, points_W):
 #
 # - Put the first two points as far apart as the part allows, and the third as far *off their line* as it allows.
 # - Measure more than three points if you can, and fit.
-# - Write frames into names (`T_WF`), never `T` or `T2`. Most calibration bugs are a matrix used in the wrong direction.
+# - Write frames into names (`T_WF`); a bare `T` is for functions that take any pose. Most calibration bugs are a matrix used in the wrong direction.
 # - Store poses as matrices or quaternions. Compare poses, never angles.
 
 # %% questions [markdown]
