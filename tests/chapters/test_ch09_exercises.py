@@ -1,5 +1,6 @@
 """Chapter 9's exercises: answers that look right and are not, and right ones of more than one style."""
 
+import copy
 import linecache
 import re
 from dataclasses import replace
@@ -48,6 +49,50 @@ def test_resamplers_draw_from_the_rng_they_get(name, seed):
         return getattr(particles, name)(weights, np.random.default_rng(seed))
 
     assert judge(name, answer).status == NOT_YET
+
+
+def from_a_copy(function):
+    return lambda *args: function(*args[:-1], copy.deepcopy(args[-1]))
+
+
+@pytest.mark.parametrize("name", ["sample_motion", "resample_roulette", "resample_systematic"])
+def test_random_numbers_go_on_from_call_to_call(name):
+    told = judge(name, from_a_copy(next(item for item in CHAPTER.items if item.id == name).reference)).text
+    assert "called again with the same `rng`" in told.lower()
+
+
+def with_ends_of_few_digits(spins):
+    def resample(weights, rng):
+        ends = np.cumsum(weights / np.sum(weights)).astype(np.float16).astype(float)
+        return np.searchsorted(ends, spins(len(weights), rng), side="right").clip(max=len(weights) - 1)
+
+    return resample
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    "name, spins",
+    [
+        ("resample_roulette", lambda m, rng: rng.random(m)),
+        ("resample_systematic", lambda m, rng: (rng.random() + np.arange(m)) / m),
+    ],
+)
+def test_a_wheel_of_few_digits_is_refused(name, spins, seed):
+    assert judge(name, with_ends_of_few_digits(spins), seed).status == NOT_YET
+
+
+def test_a_wheel_read_in_a_loop_is_right():
+    def by_a_loop(weights, rng):
+        found = []
+        for spin in rng.random(len(weights)) * sum(weights):
+            k, end = 0, weights[0]
+            while end <= spin and k < len(weights) - 1:
+                k += 1
+                end += weights[k]
+            found.append(k)
+        return np.array(found)
+
+    assert judge("resample_roulette", by_a_loop).status == CORRECT
 
 
 def test_spins_that_share_their_random_number_are_refused():

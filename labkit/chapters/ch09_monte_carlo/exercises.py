@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp, ndtr, ndtri
+from scipy.special import chdtri, logsumexp, ndtr, ndtri
 
 from ...documents.lecture.examples import load_building
 from ...exercises import metrics
@@ -1388,6 +1388,10 @@ def _listens(draw, lead=""):
             return f"{lead}whatever `rng` is given, the same comes out: draw the random numbers from it."
         if not all(map(np.array_equal, first, again)):
             return f"{lead}two runs with the same seed differ: draw from the `rng` you are given alone, and keep nothing for the next call."
+        drawn_from = np.random.default_rng(seeds[0])
+        first, *later = [np.asarray(draw(function, drawn_from)) for _ in seeds]
+        if all(np.array_equal(first, other) for other in later):
+            return f"{lead}called again with the same `rng` it gives the same once more: draw from `rng` itself, which goes on from number to number. A copy of it begins where it began before."
         return None
 
     return check
@@ -1556,6 +1560,30 @@ def _is_right_of_many(resample, rng):
     return None
 
 
+THOUSAND, CALLS = np.tile([0.02, 0.04], 500), 32
+PATIENT = 0.4  # seconds of processor time for them: a slow but right roulette is called less often
+FAR = float(chdtri(len(THOUSAND) - 1, 1e-9))  # a right roulette is farther off in one of a thousand million checks
+
+
+def _is_right_of_a_thousand(resample, rng):
+    """Intervals so narrow that ends with few digits spoil them."""
+    counts, calls, began = np.zeros(len(THOUSAND)), 0, seconds()
+    while calls < CALLS and seconds() - began < PATIENT:
+        found, calls = _counts(resample, THOUSAND, rng, 1), calls + 1
+        if isinstance(found, str):
+            return f"with {len(THOUSAND)} weights: {found}."
+        counts += found[0]
+    expected = calls * len(THOUSAND) * THOUSAND / THOUSAND.sum()
+    chi_square = ((counts - expected) ** 2 / expected).sum()
+    if chi_square < FAR:
+        return None
+    return (
+        f"in {calls} calls with {len(THOUSAND)} weights, 0.02 and 0.04 by turns, the counts lie farther from their shares "
+        f"than chance explains: the sum of (count - expected)^2 / expected is {chi_square:.0f}, where about "
+        f"{len(THOUSAND)} is to be expected. Have the ends of the intervals all their digits?"
+    )
+
+
 EACH_SPIN = "each spin must reach over the whole wheel, and none may depend on another"
 
 
@@ -1578,18 +1606,21 @@ def _spins_are_independent(resample, rng):
 
 
 def _spokes_are_even(resample, rng):
-    weights = np.array([0.05, 0.3, 0.15, 0.22, 0.28])
-    found = _counts(resample, weights, rng, 200)
-    if isinstance(found, str):
-        return f"with the weights {weights.tolist()}: {found}."
-    for counts in found:
-        off = np.abs(counts - 5 * weights)
-        if off.max() >= 1 + 1e-9:
-            k = int(np.argmax(off))
-            return (
-                f"index {k} with M w = {5 * weights[k]:.2f} was drawn {counts[k]} times: evenly spaced spokes meet it "
-                "either the next lower or the next higher whole number of times."
-            )
+    """Counts of a few weights, and of so many that ends of intervals with few digits spoil them."""
+    few, many = np.array([0.05, 0.3, 0.15, 0.22, 0.28]), np.linspace(0.02, 0.06, 1000)
+    for weights, runs, told in ((few, 200, f"the weights {few.tolist()}"), (many, 3, "1000 weights, 0.02 to 0.06")):
+        found = _counts(resample, weights, rng, runs)
+        if isinstance(found, str):
+            return f"with {told}: {found}."
+        wanted = len(weights) * weights / weights.sum()
+        for counts in found:
+            off = np.abs(counts - wanted)
+            if off.max() >= 1 + 1e-9:
+                k = int(np.argmax(off))
+                return (
+                    f"with {told}, index {k} with M w / W = {wanted[k]:.2f} was drawn {counts[k]} times: evenly spaced "
+                    "spokes meet it either the next lower or the next higher whole number of times."
+                )
     return None
 
 
@@ -2965,6 +2996,7 @@ CHAPTER = Chapter(
                 _of_any_sum,
                 _of_whole_numbers,
                 _is_right_of_many,
+                _is_right_of_a_thousand,
             ),
             hints=(
                 "Each weight owns an interval as wide as itself. Where does a random number fall?",
