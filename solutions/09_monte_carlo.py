@@ -91,8 +91,8 @@ print(f"nearest obstacle {ranges.min():.2f} m, median {np.median(ranges):.2f} m"
 # $\chi'_{k+1} = \chi_{k+1} = \emptyset$. And "with probability $w_i$" needs a division by $W$: densities do not add
 # up to 1.
 #
-# **Moving.** Noise of standard deviation `std_u` is added to the control, then chapter 7's model is applied (slide
-# *Bewegungsmodell*).
+# **Moving.** Normal noise of standard deviation `std_u`, independent for v and omega, is added to the control, then
+# chapter 7's model is applied (slide *Bewegungsmodell*).
 
 # %% sample_motion
 @ex.sample_motion
@@ -162,7 +162,7 @@ def log_sum_exp(log_weights):
 
 
 # %% beams [markdown]
-# A scan has 541 beams, so its product is zero. With all weights zero there is nothing to draw from. A sum of *log densities*, each from its formula, stays finite (the logarithm of a density that has become zero does not:
+# A scan has 541 beams: at 0.01 each, the product is zero. With all weights zero there is nothing to draw from. A sum of *log densities*, each from its formula, stays finite (the logarithm of a density that has become zero does not:
 # it is $-\infty$). Subtracting the largest sum first makes the best particle weigh $e^0 = 1$ (`particles.normalize_weights`).
 #
 # ## Weighing by beams
@@ -468,8 +468,8 @@ for task, model, good, low, high, steps in zip(*(table[name] for name in columns
 # %% scan_from_depth
 @ex.scan_from_depth
 def scan_from_depth(depth, field_of_view, near, far):
-    """Return (ranges, bearings) of the columns seen, depth of shape (n,) from left to
-    right.
+    """Return (ranges, bearings) of the columns seen, depth (m) of shape (n,) from left to
+    right, field_of_view in rad.
 
     A column is seen when its depth is from near to far. Bearings are positive to the
     left.
@@ -492,8 +492,8 @@ for name, one in (("laser", sensors.Scanner()), ("camera", sensors.XTION)):
 # %% camera-said [markdown]
 # In the table above the rows *camera* are the global localization with it: the same filter,
 # the same particles, the same 60 steps. **What makes more beams of the camera miss every
-# wall**, the reach or the opening angle? Put a `sensors.Scanner` with one of both into the
-# cell, and look.
+# wall**, the reach or the opening angle? Put a third sensor into the cell that has one of both from the camera, such as
+# `sensors.Scanner(r_max=3.5)`, and look.
 
 # %% beyond [markdown]
 # ## Beyond the document: fewer particles when fewer will do (*further*)
@@ -603,7 +603,8 @@ def hunt_4(weigh):
 # %% break-it [markdown]
 # ## Break it
 #
-# One beam without an echo makes the plain beam model say: impossible, everywhere. What should a filter do when *all*
+# One beam without an echo, read as the maximum range, makes the plain beam model, whose density has become zero there,
+# say: impossible, everywhere. What should a filter do when *all*
 # weights are zero? Some restart in silence, some add a
 # tiny constant, some die. Ours keeps the cloud, skips the scan, and says so.
 
