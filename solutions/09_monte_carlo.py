@@ -468,8 +468,8 @@ for task, model, good, low, high, steps in zip(*(table[name] for name in columns
 # %% scan_from_depth
 @ex.scan_from_depth
 def scan_from_depth(depth, field_of_view, near, far):
-    """Return (ranges, bearings) of the columns seen, depth (m) of shape (n,) from left to
-    right, field_of_view in rad.
+    """Return (ranges, bearings) of the columns seen, depth of shape (n,) from left to
+    right, in m; field_of_view in rad.
 
     A column is seen when its depth is from near to far. Bearings are positive to the
     left.

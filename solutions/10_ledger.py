@@ -76,7 +76,7 @@ def half_unit(printed):
 # ## What the inputs hide
 #
 # A result computed from printed numbers inherits what each of them hides. Move one input at a time by its half unit, up and down, and see how far the result
-# goes; the larger move counts, and the moves of all inputs add up. That is the *bound* of the table, to first order. Where inputs were never published, it is what a reconstruction leaves open.
+# goes; the larger move counts, and the moves of all inputs add up. That is the *bound* of the table; what several moves at once do beyond their sum is left out. Where inputs were never published, it is what a reconstruction leaves open.
 
 
 # %% bound
@@ -110,8 +110,8 @@ print(f"length: {np.linalg.norm([98.5415, 99.9165, 181.6006]):.4f} mm, bound "
 # ## The words
 #
 # The status follows from the printed number, the computed value, and what is known about it: a *bound*, by which the digits of the printed
-# inputs can move the value; whether a *misprint* is proved, all single slips elsewhere having been tried; whether inputs had to be *simulated*. A simulation that lands within bound
-# and half unit together is *consistent*; one that does not decides nothing: *not computable*. Otherwise the milder word wins: *reproduced* within the half unit, *rounding* within
+# inputs can move the value; whether a *misprint* is proved, all single slips elsewhere having been tried; whether inputs had to be *simulated*. What was simulated is judged by that alone: what lands within bound
+# and half unit together is *consistent*, all else decides nothing: *not computable*. Otherwise the milder word wins: *reproduced* within the half unit, *rounding* within
 # half unit plus bound, *misprint* where one is proved, *contradiction* where nothing else is left. (*Cut off* and *refuted* are left out here.) Printed numbers come as strings, some with a decimal comma.
 # What we chose ourselves: the order of the words, and what counts as one slip.
 
@@ -137,7 +137,7 @@ def status(printed, value, bound, misprint, simulated):
 # ## Who slipped?
 #
 # Numbers that disagree accuse everybody. A *misprint* is proved when a single slip of one number explains everything, and no slip of another does. `single_slips(text)`
-# lists, as texts, all numbers one slip away: a sign lost, digits swapped, one wrong, one too many, one missing, the point moved. Entries and their average were printed; find everyone who could be it.
+# lists, as texts, all numbers one slip away: a sign lost, digits swapped, one wrong, one too many, one missing, the point moved. Entries and their average were printed; find everyone who could be it. Try each slip as if it had been printed so.
 
 
 # %% suspects

@@ -56,7 +56,7 @@ print("sees the target at", sensor.T[0, :3, 3], "mm")
 # ## Look before you compute
 #
 # Whatever the mounting, the loop closes on the same target in every row, $T_{BF,i}\,X\,T_{ST,i} = T_{BT}$. Take two neighboring rows and the target falls out:
-# $A\,X = X\,B$, one motion, seen from the flange and from the sensor.
+# $A\,X = X\,B$, one motion, seen from the flange and from the sensor: $A$ leads from the flange of one row to that of the next.
 
 # %% motions
 @ex.motions
@@ -144,7 +144,7 @@ display(slipped)
 
 # %% report-text [markdown]
 # In a terminal, `python lab.py calibrate hand-eye --robot R --sensor S --out report` writes the same as a page with charts, and a view you can turn. Read it from the top: how many rows agree, what disagrees, and how. A few rejected rows here and there are bad readings.
-# A block of them that agrees with itself is a second mounting. Suppose nobody had looked, and all 24 rows had been fitted: the result keeps that fit as `slipped.plain`, and `.T` is the matrix of either. **How far apart, in mm, do this fit and the one to the rows that agree put the sensor?**
+# A block of them that agrees with itself is a second mounting. Suppose nobody had looked, and all 24 rows had been fitted: the result keeps that fit as `slipped.plain`, and `.T` is the matrix of either. **How far apart, in mm, do this fit and the one to the rows that agree put the sensor on the flange?**
 
 # %% slip_cost
 slip_cost = ...  # your code here
