@@ -399,7 +399,7 @@ class Explanations(Named):
         if words is None or not words.startswith("exactly"):
             given = [args for args, *_ in draws]
             words = own_steps.condition_words(self.function, given, missed, kind) or words
-        was = "was not right" if stopped else "was wrong"
+        was = "gave no right result" if stopped else "was wrong"
         return words and f"On {len(draws)} draws it {was} {words}."
 
     def _follows(self, draws, kind, name, true):

@@ -132,10 +132,10 @@ class Staying(Evidence):
                 continue
             as_then = same_numbers(numbers_of(run.result), numbers_of(before.result))
             if as_then or self._is_right_on(self.defaults.fresh, args, exercise.metric, expected):
-                told = "returns what it returned then, which is right no more" if as_then else "is right no more"
+                told = "returns what it returned then" if as_then else "is no longer right"
                 return (
                     f"right at first, but called again with another `{name}` and all else as before, your function "
-                    f"{told}: is something kept, and found again by a part of the arguments alone?"
+                    f"{told}: is a result kept under a key that leaves some arguments out?"
                     f"{self._about_globals()}"
                 )
         return None

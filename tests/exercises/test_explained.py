@@ -308,7 +308,7 @@ def test_what_stops_on_some_draws_only_is_told_where():
 
     draws = tuple(lambda rng, std=std: (rng.normal(size=2), std) for std in (1.7, -1.3))
     text = exercise(lambda x, std: x * std, draws).judge(formula, rng=np.random.default_rng(0)).text
-    assert "it was not right exactly where `std` is negative" in text and "shapes" not in text
+    assert "it gave no right result exactly where `std` is negative" in text and "shapes" not in text
 
 
 def test_of_shapes_is_asked_only_where_they_differ():

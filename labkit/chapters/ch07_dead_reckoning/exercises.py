@@ -721,7 +721,11 @@ def _covariance(var_v, var_omega):
 
 def _without_absolute_values():
     """The control's covariance with one or more of its three absolute values left out."""
-    places = ("|v| in the first variance", "|omega| in the second", "|v| in the second")
+    places = (
+        "|v| in the variance of v",
+        "|omega| in the first term of that of omega",
+        "|v| in the second term of that of omega",
+    )
     left_out = ((0,), (1,), (2,), (1, 2), (0, 2), (0, 1, 2), (0, 1))
     for number, which in enumerate(left_out, 1):
         first, turn, drift = (float if k in which else abs for k in range(3))
@@ -2116,8 +2120,9 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _offset(lambda d, turn, way: way / turn * (1 - np.cos(turn))),
-                    "Here the middle of the robot goes the way that was counted. That is the way of its left wheel: the middle goes "
-                    "way (1 + excess / 2), on a circle half a track beside it.",
+                    "Here the middle of the robot goes the way that was counted. The left wheel goes that way, the middle "
+                    "way (1 + excess / 2): on a circle whose radius is larger by half a track.",
+                    "wheel_offset-6b4841",
                 ),
                 Mistake(
                     _offset(lambda d, turn, way: d / turn * (1 - np.cos(d * turn / way))),
@@ -2243,7 +2248,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _bicycle_about_its_middle,
-                    "That is the model about the middle of the car, which slips aside, with v as the speed there. Here v is the speed of the rear axle's middle.",
+                    "That is the model about the middle of the car, which does not move along the car's axis, with v as the speed there. Here v is the speed of the rear axle's middle.",
+                    "ackermann_twist-534253",
                 ),
                 Mistake(
                     lambda v, d, L: np.array([v, v * np.tan(d) * L]),

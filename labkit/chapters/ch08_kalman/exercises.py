@@ -1172,7 +1172,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _updated(gain=lambda P, C, R: _gain(P, C, np.diag(np.diag(R)))),
-                    "You took the diagonal of cov_z alone. Noises that belong together have entries beside it.",
+                    "You took the diagonal of cov_z alone. Noises that belong together have entries off the diagonal.",
+                    "update-27aa40",
                 ),
                 Mistake(
                     _updated(gain=lambda P, C, R: C @ P @ np.linalg.inv(C @ P @ C.T + R)),
@@ -1209,7 +1210,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _updated(gain=lambda P, C, R: P @ C.T @ (1 / (C @ P @ C.T + R))),
-                    "`1 / S` turns every entry over. The inverse of a matrix is np.linalg.inv(S).",
+                    "`1 / S` is one over each entry by itself. The inverse of a matrix is np.linalg.inv(S).",
+                    "update-2ffc44",
                 ),
                 Mistake(
                     _updated(gain=lambda P, C, R: P @ C.T @ np.linalg.inv(C @ P @ C.T + R @ R)),
@@ -1384,7 +1386,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _fused(lambda v, s: [1 / v, *(1 / s)]),
-                    "The sensors come with standard deviations: square them before you take one over them.",
+                    "The sensors come with standard deviations: square them first, a weight is one over the variance.",
+                    "fuse_two_sensors-569d4f",
                 ),
                 Mistake(lambda *given: fuse_two_sensors(*given)[::-1], "The order is position, variance."),
                 Mistake(
@@ -2618,7 +2621,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda t, x, P: _error(t, x) @ (1 / P) @ _error(t, x),
-                    "`1 / cov` turns every entry over. The inverse of a matrix is np.linalg.inv(cov).",
+                    "`1 / cov` is one over each entry by itself. The inverse of a matrix is np.linalg.inv(cov).",
+                    "nees-f848b8",
                 ),
                 Mistake(
                     lambda t, x, P: _error(t, x) @ _error(t, x) / np.linalg.det(P),
@@ -2679,7 +2683,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _gated(lambda y, S: y @ (1 / S) @ y),
-                    "`1 / S` turns every entry over. The inverse of a matrix is np.linalg.inv(S), or np.linalg.solve.",
+                    "`1 / S` is one over each entry by itself. The inverse of a matrix is np.linalg.inv(S), or np.linalg.solve.",
+                    "gate-4792aa",
                 ),
                 Mistake(
                     lambda y, S, g: gate(y, S, 5.991),

@@ -1384,7 +1384,7 @@ def _listens(draw, lead=""):
             drawn_from = np.random.default_rng(seeds[0])
             draw(function, drawn_from)
             if drawn_from.bit_generator.state != np.random.default_rng(seeds[0]).bit_generator.state:
-                return f"{lead}what you draw from `rng` changes nothing on one draw, which 8 seeds give alike. Is it far too small, or not used?"
+                return f"{lead}you draw from `rng`, but 8 different seeds give the same result. Is what you draw far too small, or not used?"
             return f"{lead}whatever `rng` is given, the same comes out: draw the random numbers from it."
         if not all(map(np.array_equal, first, again)):
             return f"{lead}two runs with the same seed differ: draw from the `rng` you are given alone, and keep nothing for the next call."
@@ -2265,7 +2265,7 @@ def _hunt(id, reference, specimen, why, hints, others, good=GOOD, extra=("rng",)
         mistakes=[
             Mistake(
                 lambda *_: True,
-                f"Your test said True of the specimen, which means correct (if you meant it to say caught: that is False). {why}",
+                f"Your test said True of the specimen, which means correct. For one that is caught it must return False. {why}",
                 id=named,
             ),
             Mistake(lambda *_: None, "Your test returned None: it has to return True (passed) or False (caught)."),
@@ -3398,7 +3398,7 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         _cycle(due=late),
-                        "The weights are right. Where n is more than 1 you resample one step late: in steps 1, n + 1, 2 n + 1, ...",
+                        "The weights are right. Where n is more than 1 you resample in steps 1, n + 1, 2 n + 1, ... instead of n, 2 n, 3 n, ...",
                         id=id,
                     )
                     for late, id in (
@@ -3476,6 +3476,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda a, w: math.degrees(particles.circular_mean(np.radians(a), w)),
                     "The angles are in radians already: nothing is to be converted.",
+                ),
+                Mistake(
+                    lambda a, w: 0.5 * math.atan2((w * np.sin(2 * a)).sum(), (w * np.cos(2 * a)).sum()),
+                    "You doubled the angles and halved the result. That is the mean of axes, which have no front: directions are averaged as they are.",
                 ),
                 Mistake(lambda a, w: particles.circular_mean(a), "The weights are missing."),
                 Mistake(
@@ -3750,11 +3754,13 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _depth(angle=lambda u, fov: np.arctan((u - 1 / len(u)) * math.tan(fov / 2))),
-                    "Half a column aside: the middle of column k is at k + 0.5.",
+                    "Off by half a column: the middle of column k is at k + 0.5.",
+                    "scan_from_depth-4ad7d0",
                 ),
                 Mistake(
                     _depth(angle=lambda u, fov: np.arctan((u + 1 / len(u)) * math.tan(fov / 2))),
-                    "Half a column aside: the middle of column k is at k + 0.5.",
+                    "Off by half a column: the middle of column k is at k + 0.5.",
+                    "scan_from_depth-4ad7d0-2",
                 ),
                 Mistake(
                     _depth(seen=lambda d, near, far: (d > near) & (d < far)),
