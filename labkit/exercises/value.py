@@ -1,6 +1,7 @@
 """A number to find, with its unit."""
 
 import contextlib
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +11,7 @@ from .outcome import CORRECT, NOT_YET, TO_DO, Item, Outcome, is_blank
 from .wording import closed
 
 LISTED = 9  # entries of a wrong array of which those that are right are listed
+NEAR = 0.2  # of the largest entry: farther off, an array is not called near
 UNITS = {
     "mm": ("length", 1e-3),
     "cm": ("length", 1e-2),
@@ -157,8 +159,8 @@ class Value(Item):
 
     def _which_way(self, answer, expected):
         if np.ndim(expected):
-            right = _right_entries(answer, expected)
-            return f"not this value{self._in_unit()}{right}: the hints lead on."
+            told = _right_entries(answer, expected) or _how_near(answer, expected)
+            return f"not this value{self._in_unit()}{told}: the hints lead on."
         if not np.isfinite(answer):
             return f"not this value{self._in_unit()}: the hints lead on."
         if relations.significant_digits(answer, expected) == 1:
@@ -183,6 +185,18 @@ def _right_entries(answer, expected):
     if not told or right.all():
         return ""
     return f", though {', '.join(map(str, told))} (counted from 0) {'are' if len(told) > 1 else 'is'} right"
+
+
+def _how_near(answer, expected):
+    """That every entry of a wrong array is nearly right, as a part of a sentence."""
+    answer, expected = np.asarray(answer, dtype=float), np.asarray(expected, dtype=float)
+    off = np.abs(answer - expected).max() / np.abs(expected).max(initial=1e-300)
+    if not off < NEAR:
+        return ""
+    return (
+        f", though no entry is off by more than {math.ceil(100 * off)} % of the largest (perhaps by an approximation, "
+        "a sample, or a small term that is missing)"
+    )
 
 
 def _refusal_words(refusal, answer, expected):

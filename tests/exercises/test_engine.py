@@ -1274,6 +1274,15 @@ def test_what_follows_from_a_value_is_told_where_nothing_else_is():
     assert root.judge(np.nan).status == NOT_YET
 
 
+def test_how_near_a_wrong_array_is_stands_where_no_entry_is_right():
+    item = Value(
+        "nearly", reference=lambda: np.array([2.0, 5.0, 3.0]), metric=metrics.Numbers(1e-6), hints=("a", "b", "c")
+    )
+    told = item.judge(np.array([2.03, 4.93, 3.11])).text
+    assert told.startswith("not this value, though no entry is off by more than 3 % of the largest (perhaps")
+    assert item.judge(np.array([9.0, 1.0, 7.0])).text == "not this value: the hints lead on."
+
+
 def test_constants_of_any_shape_are_no_arguments_that_are_read():
     def nested(v):
         return sum(w * c[0] for w, c in ((100, (1, 1)), (200, (-1, -2)))) * np.ones(3)

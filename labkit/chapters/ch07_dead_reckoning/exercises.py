@@ -799,6 +799,10 @@ def _begun_anew(x, cov, u, dt, cov_u):
     return propagate(x, np.zeros((3, 3)), u, dt, cov_u)
 
 
+def _moved_before(x, cov, u, dt, cov_u):
+    return propagate(step_euler(x, u, dt), cov, u, dt, cov_u)
+
+
 def _not_handed_on(x, cov, u, dt, cov_u):
     return x, propagate(x, cov, u, dt, cov_u)[1]
 
@@ -1991,6 +1995,10 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda: _loop(_not_handed_on)[1],
                     "Every step starts at the pose of the start here: hand the pose on as well as the covariance, `x, end_cov = propagate(...)`.",
+                ),
+                Mistake(
+                    lambda: _loop(_moved_before)[1],
+                    "The pose is moved twice in every step. `propagate` takes the step itself, from the pose before it.",
                 ),
                 Mistake(
                     lambda: _loop(at_the_end=True)[1],
