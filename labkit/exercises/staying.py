@@ -4,6 +4,8 @@ import copy
 import functools
 import itertools
 
+import numpy as np
+
 from . import budget, guard, scope
 from .budget import Budget
 from .evidence import Evidence
@@ -11,7 +13,8 @@ from .results import Refusal, admitted_by, is_another, numbers_of, same_numbers
 
 REPEATING = 0.02  # seconds of processor time in which an answer that came out right is called again
 IN_A_ROW = 8  # times that a draw is called then, of each of ...
-TURNS = 4  # of draws in which each argument is exchanged: of one the result may hang little, or not at all
+TURNS = 6  # of draws in which each argument is exchanged: of one the result may hang little, or not at all
+PARTS = 2  # of these, in which only its second half is
 ALIKE = 3  # kinds of results at most, where they are words or truth values
 UNFILLED = {"empty", "empty_like"}  # what makes arrays that hold whatever stood there before
 
@@ -114,8 +117,8 @@ class Staying(Evidence):
         """Whether a function that has something to keep results in finds them again by a part of the arguments, in
         words; None where it does not.
 
-        Two fresh calls differ in one argument. That of the first is another draw's and need not go with the rest: only
-        the second is judged, which nobody misses who has computed it.
+        Two fresh calls differ in one argument, or in a part of it. That of the first is another draw's and need not go
+        with the rest: only the second is judged, which nobody misses who has computed it.
         """
         exercise, kind = self.exercise, Budget(budget.SPECIAL)
         if exercise.metric is None or not self.pairs or not scope.may_keep(self.function):
@@ -124,9 +127,10 @@ class Staying(Evidence):
             args, other = (exercise.cases[(turn + k + more) % len(exercise.cases)](rng) for more in (0, turn % 2))
             if not kind.left() or k >= min(len(args), len(other)) or type(args[k]) is not type(other[k]):
                 continue
+            before = other[k] if turn < TURNS - PARTS else begun_alike(args[k], other[k])
             expected = exercise.reference(*copy.deepcopy(args))
             admitted = functools.partial(admitted_by, exercise.metric, expected)
-            before = guard.run(self.function, (*args[:k], other[k], *args[k + 1 :]), admitted, exercise.limit)
+            before = guard.run(self.function, (*args[:k], before, *args[k + 1 :]), admitted, exercise.limit)
             run = guard.run(self.function, args, admitted, exercise.limit)
             if before.error is not None or run.error is not None or exercise.metric.equal(run.result, expected):
                 continue
@@ -135,7 +139,17 @@ class Staying(Evidence):
                 told = "returns what it returned then" if as_then else "is no longer right"
                 return (
                     f"right at first, but called again with another `{name}` and all else as before, your function "
-                    f"{told}: is a result kept under a key that leaves some arguments out?"
+                    f"{told}: is a result kept under a key that leaves a part of the arguments out?"
                     f"{self._about_globals()}"
                 )
         return None
+
+
+def begun_alike(value, other):
+    """Another value of an argument that begins as this one, be it bytes or an array: its second half is the other's."""
+    if isinstance(value, bytes):
+        return value[: len(value) // 2] + other[len(value) // 2 :]
+    if not isinstance(value, np.ndarray) or np.shape(value) != np.shape(other) or value.size < 2:
+        return other
+    half = np.arange(value.size).reshape(value.shape) < value.size // 2
+    return np.where(half, value, other)

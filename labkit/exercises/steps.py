@@ -286,6 +286,7 @@ class Search:
         _, line, code, mends = changes[told]
         mends = self._of_truth(mends) + self._if_at_all(told)
         words = self._whatever_words(line, code, mends) or self._weight_words(line, code, mends)
+        words = words or self._settled_words(line, mends)
         return words or f"in line {line}, `{code}`: {mends}. {self._alone()}"
 
     def _of_truth(self, mends):
@@ -313,6 +314,21 @@ class Search:
         alike = [k for k, text in places if text == code or turned and BOUND.search(text) and code in text]
         truths = (k for k in alike if k in self.written.of_truth)
         return self._turned_words(("value", k, change, None) for k in truths for change in rerun.ALWAYS_THE_SAME)
+
+    def _settled_words(self, line, mends):
+        """A condition further down that a change settles: where it mends as well that it always or never holds, nothing
+        is known of what it compares.
+        """
+        if mends.endswith(("never happen", "always happen")):
+            return None
+        places, truths = self.written.places, sorted(self.written.of_truth)
+        behind = [k for k in truths if places[k][0] > line and not self._is_fixed_truth(k)]
+        return self._turned_words(("value", k, change, None) for k in behind for change in rerun.ALWAYS_THE_SAME)
+
+    def _is_fixed_truth(self, k):
+        """Whether a condition comes out alike wherever it is met."""
+        met = [values[k][1] for values in self.values if values[k][0]]
+        return len({bool(truth) for value in met for truth in np.ravel(value)}) < 2
 
     def _weight_words(self, line, code, mends):
         """What a line binds, or a bound keeps, where a change of it mends only because that is 1 everywhere then, or as

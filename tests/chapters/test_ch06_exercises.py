@@ -21,6 +21,14 @@ def texts(name, answer, status=NOT_YET):
     return {outcome.text for outcome in outcomes}
 
 
+def test_a_packet_that_is_kept_by_its_time_is_told():
+    def decode(data, known={}):  # noqa: B006, what it keeps is the slip
+        v = np.frombuffer(data, "<f8")
+        return known.setdefault(v[1], (v[1], 1000 * v[2:5], v[11:15]))
+
+    assert all("under a key that leaves a part" in text for text in texts("decode_packet", decode))
+
+
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_block_of_the_equation_may_have_either_sign(sign):
     texts("kron_row", lambda A, B: sign * (np.kron(np.eye(3), A) - np.kron(B.T, np.eye(3))), CORRECT)

@@ -31,6 +31,21 @@ def told_of(module, id, text, **known):
     return outcome.text
 
 
+MOTIONS = """
+def motions(T_BF, T_ST):
+    A, B = np.linalg.inv(T_BF[:-1]) @ T_BF[1:], T_ST[:-1] @ np.linalg.inv(T_ST[1:])
+    cos = (np.trace(A[:, :3, :3], axis1=1, axis2=2) - 1) / 2
+    keep = cos < np.cos(np.deg2rad(0.5))
+    return A[keep], B[keep]
+"""
+
+
+def test_a_change_that_settles_a_condition_further_down_is_told_of_the_condition():
+    """With a minus for the division the cosine is always small enough, and it was right before."""
+    told = told_of(own, "motions", MOTIONS)
+    assert "stands where" not in told and "`keep = cos < np.cos(np.deg2rad(0.5))`" in told
+
+
 STATUS = """
 def status(printed, value, bound, misprint, simulated):
     x = float(printed.replace(",", "."))

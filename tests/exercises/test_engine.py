@@ -1184,6 +1184,16 @@ def test_a_result_that_is_kept_by_a_part_of_the_arguments_is_told():
         assert exercise.judge(right, rng=np.random.default_rng(0)).status == CORRECT
 
 
+@pytest.mark.parametrize("first", [0, 3])
+def test_a_result_that_is_kept_by_a_part_of_an_argument_is_told(first):
+    def remembers(v, known={}):  # noqa: B006, what it keeps is the slip
+        return known.setdefault(float(v[first]), 2 * v)
+
+    exercise = replace(DOUBLE, draw=lambda rng: (rng.normal(size=8),), mistakes=[])
+    outcome = exercise.judge(remembers, rng=np.random.default_rng(0))
+    assert outcome.status == NOT_YET and "under a key that leaves a part of the arguments out" in outcome.text
+
+
 def test_a_result_that_is_kept_by_all_but_an_argument_that_is_no_number_and_seldom_counts_is_told():
     """As rays do by all but the grid: most end at their reach in every grid."""
     exercise = replace(
