@@ -552,8 +552,8 @@ print(inspect.getsource(specimens.specimen_2))
 
 @ex.hunt_2
 def hunt_2(resample, rng):
-    """Return True if even the lightest of many particles get their share, False
-    otherwise."""
+    """Return True if even the lightest of many particles, seven or more, get their
+    share, False otherwise."""
     ### BEGIN SOLUTION
     weights = np.array([0.5] + 10 * [0.05])
     index = np.concatenate([resample(weights, rng) for _ in range(1000)])

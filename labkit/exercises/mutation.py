@@ -525,7 +525,7 @@ def _unstacked(function):
         for i, part in enumerate(parts.elts):
             new = type(parts)([*parts.elts[:i], *parts.elts[i + 1 :]], ast.Load())
             _locate(new, parts)
-            mends = f"{STACKED} `{ast.unparse(part)}` is too many"
+            mends = f"{STACKED} `{ast.unparse(part)}` should be left out"
             yield Change("", mends, 1, parts, ((call, "args", [new, *call.args[1:]]),))
 
 
@@ -921,11 +921,11 @@ DIVISOR = "with a divisor where a quotient belongs"
 IN_DEGREES = "with one value times 180/pi, as from radians to degrees"
 REVERSED = (  # (words of what was changed in a right formula, what is wrong where the change mends)
     (r"with (.+) where (.+) belongs", r"\2 stands where \1 belongs"),
-    (r"without one of its (.+)s", r"one \1 is too many"),
-    (r"without one side of `(\w+)`", r"one side of `\1` is too many"),
+    (r"without one of its (.+)s", r"one \1 should be left out"),
+    (r"without one side of `(\w+)`", r"one side of `\1` should be left out"),
     (r"without `(\w+)=` in one call", r"`\1=` does not belong there"),
-    (r"without `(\w+)`", r"`\1` is too much"),
-    (r"without the (second argument of `norm`)", r"the \1 is too many"),
+    (r"without `(\w+)`", r"`\1` is to be left out"),
+    (r"without the (second argument of `norm`)", r"the \1 should be left out"),
     (r"with one transpose too many, or too few", "one transpose is missing, or too many"),
     (r"with (.+) (turned around|turned over|exchanged)", r"\1 is \2"),
     (r"with the factors of one product `@` in another order", "the factors of this product belong in another order"),
@@ -966,11 +966,11 @@ def _mends(words, node, new):
 
 
 def _left_out(node, rest):
-    """That a part of an operation is too many, where the rest of it mends."""
+    """That a part of an operation should be left out, where the rest of it mends."""
     kind, alone = type(node.op), f"`{ast.unparse(rest)}` alone belongs there"
     if rest is node.right:
-        return f"the {PARTS[kind]} `{ast.unparse(node.left)}` is too many" if kind in COMMUTE else alone
-    return f"the {PARTS[kind]} `{ast.unparse(node.right)}` is too many"
+        return f"the {PARTS[kind]} `{ast.unparse(node.left)}` should be left out" if kind in COMMUTE else alone
+    return f"the {PARTS[kind]} `{ast.unparse(node.right)}` should be left out"
 
 
 def _is_of_degrees(node):
@@ -1273,7 +1273,7 @@ def _instead(statement):
     """(words, what is wrong where it mends, statements) of what may stand in a statement's place."""
     kinds = ast.Assign | ast.AugAssign | ast.If | ast.For | ast.Expr
     if isinstance(statement, kinds) and not _is_told(statement):
-        yield "without one of its steps", "this statement is too many", [ast.Pass()]
+        yield "without one of its steps", "this statement should be left out", [ast.Pass()]
     if isinstance(statement, ast.AugAssign):
         sign = f"`{ast.unparse(statement).removeprefix(ast.unparse(statement.target)).split()[0]}`"
         mends = f"{sign} keeps what was there before, which does not belong to the result: `=`"

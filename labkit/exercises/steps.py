@@ -42,7 +42,7 @@ COUNT = re.compile(r"^len\([^()]*\)$|\.shape\[-?\d\]$|\.size$")  # of which no h
 CHANCE = 1000  # one case of so many may be chance
 BOUND = re.compile(r"^[\d.e+-]+ *[<>]|[<>]=? *[\d.e+-]+$")  # a comparison with a number
 BOUNDING = re.compile(rf"(\w+\.)?({'|'.join(sorted(mutation.BOUNDS))})\(")
-UNBOUNDED = {f"`{name}` is too much" for name in mutation.BOUNDED | mutation.BOUNDS}
+UNBOUNDED = {f"`{name}` is to be left out" for name in mutation.BOUNDED | mutation.BOUNDS}
 DECIMALS = re.compile(r"[<>]=? *\d*(\.\d+(e[+-]?\d+)?|e-\d+)$|[<>]=? *\d+e-\d+$")  # a comparison with such a number
 NEARER = {  # what brings a result nearer on every draw, and what is said where it is not there yet
     re.compile("these are too few rounds: on all draws here (.+) will do"): (
@@ -53,8 +53,8 @@ NEARER = {  # what brings a result nearer on every draw, and what is said where 
     ),
 }
 COMES_NEARER = "the result comes nearer on every draw, and is not there yet"
-TOO_MANY = "is too many"  # what is wrong where leaving out a part mends
-NO_CASE = re.compile("(never|always) happen$|belongs there in all cases$|^this statement is too many$")
+LEAVE_OUT = "should be left out"  # what is wrong where leaving out a part mends
+NO_CASE = re.compile("(never|always) happen$|belongs there in all cases$|^this statement should be left out$")
 TURNED, OTHER_SIGN = "has the wrong sign", "the sign is the other one"
 UNEQUAL = ("where `==` belongs", "where `!=` belongs")  # what computed numbers are never, or always
 TRUTHS = {"`0` belongs": "`False` belongs", "`1` belongs": "`True` belongs"}
@@ -334,7 +334,7 @@ class Search:
         """What a line binds, or a bound keeps, where a change of it mends only because that is 1 everywhere then, or as
         good as 1: with another sign what a bound keeps above 0 is that bound everywhere.
         """
-        if not mends.endswith((TOO_MANY, "is too much", TURNED, OTHER_SIGN)):
+        if not mends.endswith((LEAVE_OUT, "is to be left out", TURNED, OTHER_SIGN)):
             return None
         for k, (at, *_) in enumerate(self.written.places):
             if at != line or not (self._binds(k) or self._bounds(k, code)) or not all(v[k][0] for v in self.values):
@@ -371,8 +371,8 @@ class Search:
     def _left_out_instead(self, number):
         """What says more than a change that mends only because it makes a part do nothing: that a case is never to be
         met, or always, where what it asks, in its line or before it, is changed otherwise than to a finer bound, or the
-        sign of what it does; that a part is too many, where it has another sign, name or order or is made finer, or the
-        larger one it stands in; that nothing is to be bounded, where another bound is set.
+        sign of what it does; that a part should be left out, where it has another sign, name or order or is made finer,
+        or the larger one it stands in; that nothing is to be bounded, where another bound is set.
         """
         changes = self.written.changes
         line, code, mends = changes[number][1:]
@@ -384,8 +384,8 @@ class Search:
         fixed = [(k, words) for k, (_, at, _, words) in enumerate(changes) if at >= line and _is_fixed(code)]
         case = [k for k, words in around if words.endswith(("never happen", "always happen")) and not finer]
         case += [k for k, words in fixed + larger if words in UNBOUNDED]
-        less = [k for k, text, words in at_line if text == code and TOO_MANY in words]
-        less += [k for k, words in larger if TOO_MANY in words and not finer]
+        less = [k for k, text, words in at_line if text == code and LEAVE_OUT in words]
+        less += [k for k, words in larger if LEAVE_OUT in words and not finer]
         less += [k for k, text, words in at_line if words.startswith(mutation.STACKED) and _bare(code) in _bare(text)]
         replaced = finer or " stands where " in mends or mends.endswith(" exchanged")
         plan = self.mending([("code", k) for k in case + (less if replaced else [])])
@@ -688,9 +688,9 @@ class Search:
         return {k for k, (_, code, *_) in enumerate(self.written.places) if read & set(NAMES.findall(code))}
 
     def _left_out_words(self):
-        """That a part of the code which reads the notebook's data is too many, where all is right without it."""
+        """That a part of the code which reads the notebook's data should be left out, where all is right without it."""
         read, changes = self.written.of_notebook, self.written.changes
-        parts = (k for k, (*_, mends) in enumerate(changes) if TOO_MANY in mends)
+        parts = (k for k, (*_, mends) in enumerate(changes) if LEAVE_OUT in mends)
         plan = self.mending([("code", k) for k in parts if read & set(NAMES.findall(changes[k][2]))])
         return plan and "in line {1}, `{2}`: {3}. {told}".format(*changes[plan[1]], told=self._alone())
 
@@ -877,7 +877,11 @@ class Search:
         codes = dict.fromkeys(f"`{self.written.places[part][1]}`" for part in computed)
         if not codes:
             inner = range(self.written.places[k][4], k)
-            return ", perhaps for one that goes into it" if any(self._may_be_wrong(p, solution) for p in inner) else ""
+            return (
+                ", perhaps because of one that goes into it"
+                if any(self._may_be_wrong(p, solution) for p in inner)
+                else ""
+            )
         are, them = ("are values", "them") if len(codes) > 1 else ("is a value", "it")
         return f", though {' and '.join(codes)} in it {are} of the solution as well: look at what is done with {them}"
 

@@ -682,7 +682,7 @@ PASSED_BEFORE = [
     ("sample_motion", after_the_step, "along x of the map"),
     ("sample_motion", from_one_to_the_next, "like that of the one before"),
     ("log_sum_exp", around_the_mean, "1000 below the largest"),
-    ("cast_ray", in_steps_along_x, "`sign` is too much"),
+    ("cast_ray", in_steps_along_x, "`sign` is to be left out"),
     ("cast_ray", in_steps_of_two_cells, "longer than a cell"),
     ("cast_ray", walked(1.0, None), "begin farther out"),
     ("cast_ray", walked(0.0, None, share=0.9), "a little before r_max: your result is"),

@@ -652,7 +652,7 @@ def between_axes(T, apart):
     return np.arccos(np.round((axes[:-apart] * axes[apart:]).sum(axis=1), 6))
 """
     told = told_of(own, "between_axes", text, log_so3=own.log_so3)
-    assert re.search("perhaps `round` is too much|it is the right one, rounded", told)
+    assert re.search("perhaps `round` is to be left out|it is the right one, rounded", told)
     assert "stands where" not in told
 
 

@@ -214,7 +214,7 @@ def test_a_step_that_is_wrong_is_told_by_its_line_as_in_the_notebook():
     masked = "@ex.normalize\ndef normalize(v):\n    w = v[v**2 < v @ v / 2]\n    return v / (1e-9 + np.sqrt(w @ w))"
     cells = replaced(replaced(solved_cells(), "relative", wrong), "normalize", masked)
     items = batch.judged(notebook_text(cells).encode(), 1)["items"]
-    assert "n line 4, `B.T`: one transpose is too many." in items["relative"]["text"]
+    assert "n line 4, `B.T`: one transpose should be left out." in items["relative"]["text"]
     assert "n line 4, `1e-9 + np.sqrt(w @ w)`" in items["normalize"]["text"]
 
 

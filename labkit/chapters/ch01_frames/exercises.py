@@ -754,7 +754,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a, b: np.linalg.qr(np.column_stack([a, b, np.cross(a, b)]))[0],
-                    "QR does Gram-Schmidt's work, but leaves the signs open. Turn each column to the side of its edge.",
+                    "QR does Gram-Schmidt's work, but leaves the signs open. Give each of the first two columns the sign with which it points to the side of its edge; the third is their cross product.",
+                    "gram_schmidt-303399",
                 ),
                 Mistake(
                     _projection_kept,
@@ -1133,8 +1134,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.sqrt(2) * np.linalg.norm(_hole() - _hole_as_drawn()),
-                    "This is the root of 2 times the distance, as 200 mm times the norm of the difference of both matrices is: it "
-                    "counts how far x and y are off. The hole lies on x alone.",
+                    "This is the root of 2 times the distance. So is 200 mm times the norm of the difference of both matrices, in "
+                    "which x and y both count. The hole lies on x alone.",
                     id="distance-of-matrices",
                 ),
                 Mistake(
@@ -1599,7 +1600,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _kabsch(handed=lambda U, V: np.diag([1, 1, np.linalg.det(V @ U.T)]) @ V @ U.T),
-                    "You turned the last row of V Uᵀ. Where it is a mirror image, the last column of V changes its sign, before Uᵀ is multiplied.",
+                    "You changed the sign of the last row of V Uᵀ. Where it is a mirror image, the last column of V changes its sign, before Uᵀ is multiplied.",
                     id="fit_frame-last-row",
                 ),
                 Mistake(
