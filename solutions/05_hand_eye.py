@@ -188,7 +188,7 @@ def kuka_residual(p2, T_BF, x_S, target):
 
 
 # %% validation [markdown]
-# Table 7-5 validates the end pose at *one* unnamed position: $(0.24, -0.67, -0.11)$ mm. Compare pose 1. Pose 2 has a digit too many, which is taken out. Then decide: **what is the rms over all
+# Table 7-5 validates the end pose at *one* unnamed position: $(0.24, -0.67, -0.11)$ mm. Compare pose 1. Pose 2 has a digit too many, which is taken out. Then decide: **what is the rms distance over all
 # 31**, about 0.7, 3 or 12 mm?
 
 # %% validation-code
@@ -392,7 +392,7 @@ def joint_residual(u, T0, T_BF, x_S):
 #
 # $$R_{FS}\,x_S + t_{FS} - R_{BF}^\top c = -R_{BF}^\top t_{BF}.$$
 #
-# Solve, then take the nearest rotation (`nearest_rotation`). No CAD needed.
+# Solve, then take the nearest rotation (`nearest_rotation`); translation and center stay as solved. No CAD needed.
 
 # %% linear_start
 @ex.linear_start
@@ -532,7 +532,7 @@ for row in steps:
 # ## Which sphere was it?
 #
 # The certificate (C11) says R = 29.9725 mm, listing C16 takes 30, the coordinate machine (C13) 30.277. Every $y$ in C17 contains R = 30, so another R moves all centers along y:
-# $y' = \pm\sqrt{y^2 + R^2 - 30^2}$. With which R does the fit to all 31 corrected poses leave the least rms?
+# $y' = \pm\sqrt{y^2 + R^2 - 30^2}$. With which R does the fit of scanner and center to all 31 corrected poses leave the least rms?
 
 # %% radius
 radius = ...  # your code here
@@ -786,7 +786,7 @@ def position_accuracy(command, reached):
 # %% repeatability
 @ex.repeatability
 def repeatability(reached):
-    """Return the repeatability (mm) of arrivals, shape (n, d), n - 1 below the root."""
+    """Return ISO 9283's repeatability (mm) of arrivals (n, d), n - 1 below the root."""
     ### BEGIN SOLUTION
     distances = np.linalg.norm(reached - reached.mean(axis=0), axis=1)
     return distances.mean() + 3 * distances.std(ddof=1)
