@@ -326,13 +326,13 @@ def damped_step(r, J, damping):
 # ## Trust, but measure
 #
 # $J^\top J$ has no negative eigenvalues, so Gauss-Newton points downhill; but nothing limits how far it goes. A **trust region** asks after every step: how much did $f$
-# really fall, and how much had the model promised? That is $\rho$ in (2-36). Below 0.1 the step is taken back; below ¼ the radius shrinks; above ¾, at the rim, it doubles.
+# really fall, and how much had the model promised? That is $\rho$ in (2-36). Up to 0.1 the step is taken back; below ¼ the radius shrinks; above ¾, at the rim, it doubles.
 # **Levenberg-Marquardt** turns the same knob under another name, $\lambda$: larger after a poor step, smaller after a good one.
 
 # %% gain_ratio
 @ex.gain_ratio
 def gain_ratio(cost, new_cost, g, B, step):
-    """Return actual over predicted decrease, a number, negative where the cost rose.
+    """Return actual over predicted decrease, a number.
 
     cost and new_cost: numbers, before and after the step; g, step: shape (2,);
     B: shape (2, 2).

@@ -278,7 +278,8 @@ def e_trans(residuals):
 @ex.reject_outliers
 def reject_outliers(values, factor=4.0):
     """Return a bool array, shape (n,): True where values lie within factor robust
-    standard deviations of the median. Where these are 0, all may stay as well."""
+    standard deviations of the median. Where one of these is 0, the others may stay
+    or go."""
     ### BEGIN SOLUTION
     distance = np.abs(values - np.median(values))
     return distance <= factor * 1.4826 * np.median(distance)
@@ -306,7 +307,7 @@ def mean_quaternion(q):
 #
 # `run_1.csv` is a synthetic log of such a run, its true mounting the report's result.
 # The stops are averaged for you, `A` and `B` are the motions since pose 0, and `kept`
-# says which pose has to go (pose 0 itself is no motion). Put your functions in a row;
+# is False for a pose that has to go (pose 0 itself is no motion: its equations are all 0). Put your functions in a row;
 # the result is a matrix, in mm.
 
 # %% read-the-log
@@ -472,8 +473,8 @@ def ray_direction(delays, rate):
 # %% nearest_to_rays
 @ex.nearest_to_rays
 def nearest_to_rays(origins, directions):
-    """Return the point, shape (3,), mm, with the least sum of squared distances to rays
-    from origins, shape (n, 3), along directions, shape (n, 3), of any length; n > 1."""
+    """Return the point, shape (3,), mm, with the least sum of squared distances to the
+    lines of rays from origins (n, 3) along directions (n, 3) of any length; n > 1."""
     ### BEGIN SOLUTION
     d = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     across = np.eye(3) - d[:, :, None] * d[:, None, :]
