@@ -815,7 +815,7 @@ class Search:
                 )
                 each = (self._in_which_round(k) if theirs else ", a part of it each time") if mine else ""
                 others = " on some draws" if any(case.was_right for case in self.cases) else ""
-                return f"{self._where(k)}, stands the right result{each}, but something else is returned{others}"
+                return f"{self._where(k)}, the result is right{each}, but something else is returned{others}"
         return None
 
     def _is_operand(self, k):

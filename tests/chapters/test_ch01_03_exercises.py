@@ -320,7 +320,7 @@ def way_back_in_parts(transforms):
 @pytest.mark.parametrize(
     "name, answer, told, untrue",
     [
-        ("relative", minus, "`np.linalg.solve(T_WA, T_WB)`, stands the right result", "a right formula"),
+        ("relative", minus, "`np.linalg.solve(T_WA, T_WB)`, the result is right", "a right formula"),
         ("invert", unfilled, "not orthonormal", "[0.0] * 4"),
         ("gram_schmidt", signs_alone, "a reflection", "those of the solution"),
         ("closure_error", no_length, "Your distance is 0 for every T", "You took"),

@@ -92,7 +92,7 @@ def test_the_leg_taken_backward_is_no_matter_of_the_root_alone(seed):
         a, b, c = leg @ leg, corner @ leg, corner @ corner - radius**2
         return corner + (-b + np.sqrt(b * b - a * c)) / a * leg
 
-    assert "and so does a leg from newton to corner" in judged("dogleg_step", backward, seed).text
+    assert "and newton − corner for the leg" in judged("dogleg_step", backward, seed).text
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -1258,7 +1258,7 @@ def test_what_is_right_after_the_last_round_is_no_part_of_the_result_in_each():
     """
     answer = typed(body, "newton_lateration", "landmarks, distances, start")
     text = item.judge(answer, rng=np.random.default_rng(0)).text
-    assert "stands the right result, in the last round" in text
+    assert "the result is right, in the last round" in text
 
 
 ROOT = """
@@ -1281,7 +1281,7 @@ def test_the_right_result_of_an_earlier_round_is_not_called_that_of_the_last(mon
             x = (x + a / x) / 2
     return np.cos(x) - 3 * x
     """
-    assert "stands the right result, in some round, but something else" in judged(item, twice)
+    assert "the result is right, in some round, but something else" in judged(item, twice)
 
 
 def test_what_is_too_coarse_is_told_before_the_solution_is_looked_at(monkeypatch):
@@ -1313,7 +1313,7 @@ def test_a_value_off_by_next_to_nothing_is_not_called_the_right_result():
     item = OPTIMIZATION["newton_step"]
     answer = typed("return np.linalg.solve(H + 1e-8 * np.eye(2), -g)", "newton_step", "g, H")
     outcome = item.judge(answer, rng=np.random.default_rng(0))
-    assert outcome.status == NOT_YET and "stands the right result" not in outcome.text
+    assert outcome.status == NOT_YET and "the result is right" not in outcome.text
 
 
 def test_a_bound_is_no_matter_of_units_where_a_word_is_chosen():

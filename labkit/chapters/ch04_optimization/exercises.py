@@ -1529,12 +1529,12 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     beyond.other_places(lambda n: np.linspace(0, 1, n, endpoint=False)),
-                    "Your places are others than those asked for: n of them from 0 to 1, both ends included, `np.linspace(0, 1, n)`.",
+                    "Your places differ from those asked for: n of them from 0 to 1, both ends included, `np.linspace(0, 1, n)`.",
                     id="chord-endpoint",
                 ),
                 Mistake(
                     beyond.other_places(lambda n: np.linspace(0, 1, n + 1)),
-                    "Your places are others than those asked for: n of them from 0 to 1, both ends included, `np.linspace(0, 1, n)`.",
+                    "Your places differ from those asked for: n of them from 0 to 1, both ends included, `np.linspace(0, 1, n)`.",
                     id="chord-one-more",
                 ),
                 Mistake(
@@ -1592,7 +1592,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _jacobian(lambda d, q: 2 * np.outer(d, d) / q),
-                    "The outer product is twice too large: the root has the derivative −½ w/q² divided by √(w/q), times 2(x − c).",
+                    "The outer product is twice as large as it should be: the root has the derivative −½ w/q² divided by √(w/q), times 2(x − c).",
                     id="jacobian-twice",
                 ),
                 Mistake(
@@ -2008,7 +2008,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _lowest_within,
-                    "This is the lowest point of the model within the radius, by damping. The dogleg only comes near it, on two straight legs: "
+                    "This is the lowest point of the model within the radius. The dogleg only comes near it, on two straight legs: "
                     "to the corner, then toward Newton.",
                     id="dogleg-lowest",
                 ),
@@ -2038,8 +2038,9 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _dogleg(share=lambda a, b, c: (-b - np.sqrt(b * b - a * c)) / a),
-                    "Your step leaves the corner backward, away from the Newton point: the root with − before the square root leads there, "
-                    "and so does a leg from newton to corner in place of newton − corner.",
+                    "Your step leaves the corner backward, away from the Newton point. Take the root with + before the square root, and "
+                    "newton − corner for the leg.",
+                    "dogleg_step-0db7c2",
                 ),
                 Mistake(
                     _dogleg(share=lambda a, b, c: (-b + np.sqrt(b * b - 4 * a * c)) / (2 * a)),
@@ -2179,7 +2180,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     beyond.loop(weight=1.0),
-                    "Your gain ratios are twice too large: g = Jᵀr and B = JᵀJ belong to the cost ½ rᵀr, half of r @ r.",
+                    "Your gain ratios are twice as large as they should be: the cost is ½ rᵀr, to which g = Jᵀr and B = JᵀJ belong.",
                     id="region-cost",
                 ),
                 Mistake(
