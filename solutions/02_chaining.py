@@ -227,7 +227,8 @@ print(f"found: {distance / expected:.1f} times that")
 # %% orthonormalize
 @ex.orthonormalize
 def orthonormalize(T):
-    """Return a copy of T, shape (4, 4), its block replaced by the nearest rotation."""
+    """Return a copy of T, shape (4, 4), its block (det R > 0) replaced by the nearest
+    rotation."""
     ### BEGIN SOLUTION
     U, _, Vt = np.linalg.svd(T[:3, :3])
     X = T.copy()
@@ -296,9 +297,9 @@ gaps = [chaining.closure_error(chain(loop))[1] for loop in (links, corrected)]
 much = gaps[0] > 1e6 * gaps[1]
 print(f"closed: {gaps[1] < 1e-9}, by a factor of more than a million: {much}")
 for k, (before, after) in enumerate(zip(links, corrected)):
-    angle, distance = chaining.closure_error(relative(before, after))
-    turn = np.rad2deg(angle)
-    print(f"link {k + 1}: turned by {turn:.4f} deg, its end moved by {distance:.3f} mm")
+    turned, moved = chaining.closure_error(relative(before, after))
+    by = f"{np.rad2deg(turned):.4f} deg"
+    print(f"link {k + 1}: turned by {by}, its end moved by {moved:.3f} mm")
 
 # %% break-it [markdown]
 # ## Break it

@@ -115,7 +115,7 @@ tip_length = ex.tip_length(tip_length)
 # The agreement with listing 9 is no surprise: the synthetic poses were made for it. It shows that twelve poses can give these numbers, and what they then mean.
 #
 # The sheet checks its result with equation (2): $P_\text{test} = R_i P_t + p_i - P_\text{pivot}$, ideally zero in every pose. Then it prints
-# $s_0 = \sqrt{r^\top r / n}$.
+# $s_0 = \sqrt{r^\top r / n}$, $n$ the number of poses.
 
 # %% pivot_residuals
 @ex.pivot_residuals
@@ -222,7 +222,7 @@ ex.predict("cone", guess, reveal=stages.pose_designer)
 
 # %% cone-text [markdown]
 # The same in numbers. `pivot.cone(n, angle)` gives $n$ orientations of a tool led once around a cone, tilted by that angle; `pivot.touching_poses` moves the flange
-# to where the tip then touches the point. The flange, the plate that carries the tool, is a *lever* of 100 mm away from the tip.
+# to where the tip then touches the point. The flange, the plate that carries the tool, is 100 mm away from the tip: the *lever*.
 
 # %% cone-angle
 tip = np.array([0.0, 0.0, -100.0])

@@ -392,7 +392,7 @@ def joint_residual(u, T0, T_BF, x_S):
 #
 # $$R_{FS}\,x_S + t_{FS} - R_{BF}^\top c = -R_{BF}^\top t_{BF}.$$
 #
-# Solve, then take the nearest rotation (`nearest_rotation`); translation and center stay as solved. No CAD needed.
+# Solve, then take the nearest rotation (`nearest_rotation`); translation and center may stay as solved. No CAD needed.
 
 # %% linear_start
 @ex.linear_start

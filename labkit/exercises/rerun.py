@@ -574,20 +574,20 @@ def _of_its_shape(change):
 
 SIGNLESS = "its absolute value belongs there"
 OPPOSITE = "1 less it, 1 - ..., belongs there"
-NOUGHT, ONE = "it does not belong there, but 0 in its place", "it does not belong there, but 1 in its place"
+NOUGHT, ONE = "0 belongs in its place", "1 belongs in its place"
 IDENTITY = "the identity belongs in its place"
 WEIGHTS = ONE, IDENTITY  # what is as good as no factor
 ANOTHER = "{} belongs in its place"
 OF_TRUTHS = {  # what the same changes are called where they are made to a truth value, or an array of them
     OPPOSITE: "its opposite belongs there, `not` or `~`",
-    NOUGHT: "it does not belong there, but False in its place",
-    ONE: "it does not belong there, but True in its place",
+    NOUGHT: "False belongs in its place",
+    ONE: "True belongs in its place",
 }
 OF_ARRAYS = {  # what the same changes are called where they are made to an array: a number may not take its place
-    NOUGHT: "it does not belong there, but zeros of its shape in its place",
-    ONE: "it does not belong there, but ones of its shape in its place",
-    OF_TRUTHS[NOUGHT]: "it does not belong there, but False for each of its entries",
-    OF_TRUTHS[ONE]: "it does not belong there, but True for each of its entries",
+    NOUGHT: "zeros of its shape belong in its place",
+    ONE: "ones of its shape belong in its place",
+    OF_TRUTHS[NOUGHT]: "False belongs in the place of each of its entries",
+    OF_TRUTHS[ONE]: "True belongs in the place of each of its entries",
 }
 CONSTANTS = {  # what an argument is replaced with wherever it is read: (a number, an array)
     NOUGHT: ("0", "zeros"),

@@ -860,7 +860,7 @@ def answer(grid, pose, ranges, bearings, std):
 )
 def test_a_condition_that_leaves_out_what_counts_is_to_be_true(name, text):
     told = [judge(name, typed(text), seed).text for seed in SEEDS]
-    assert all("it does not belong there, but True for each of its entries" in words for words in told)
+    assert all("True belongs in the place of each of its entries" in words for words in told)
 
 
 def test_a_control_is_blamed_where_the_noise_is_right_for_another_one_alone():

@@ -889,7 +889,7 @@ def test_a_condition_of_the_notebook_that_leaves_out_what_counts_is_to_be_true()
     formula.__globals__["kept"] = 0.3
     item = asked(lambda a, b: np.sum(a * b), lambda rng: tuple(rng.normal(size=(2, 9))))
     told = item.judge(formula, rng=np.random.default_rng(0)).text
-    assert told.startswith("in line 2, `seen = a < kept`: it does not belong there, but True for each of its entries.")
+    assert told.startswith("in line 2, `seen = a < kept`: True belongs in the place of each of its entries.")
 
 
 def test_numbers_do_not_stand_in_for_truth_values():
