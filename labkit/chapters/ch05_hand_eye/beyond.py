@@ -744,7 +744,7 @@ TRIANGULATION = [
             ),
             Mistake(
                 _height(lambda a, b, L: L * a * b / (a - b)),
-                "A difference stands below, of the tangents or in the sine: H = L tan α tan β / (tan α + tan β) = L sin α sin β / sin(α + β).",
+                "The denominator holds a difference, of the tangents or in the sine, where a sum belongs: H = L tan α tan β / (tan α + tan β) = L sin α sin β / sin(α + β).",
                 id="height-minus-reversed",
             ),
             Mistake(

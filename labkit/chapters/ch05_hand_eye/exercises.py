@@ -841,8 +841,8 @@ def _looks_up(T_BF, T_FS):
         return None
     up = int((off > 90).sum())
     where = "one pose looks" if up == 1 else f"{up} poses look"
-    steepest = f"{off.max():.0f} deg from straight down{', at most' if up > 1 else ''}"
-    return f"{where} up at the sphere, {steepest}: the table is in the way (90 is the limit)."
+    steepest = f"{'the steepest ' if up > 1 else ''}with the scanner's z axis {off.max():.0f} deg from straight down"
+    return f"{where} up at the sphere, {steepest}: the table is in the way (90 deg is the limit)."
 
 
 def _too_uncertain(T_BF, T_FS, target, x_S):
@@ -1162,7 +1162,7 @@ CHAPTER = Chapter(
                 "rms_before = np.sqrt((residuals**2).sum(axis=1).mean())`",
             ),
             mistakes=[
-                Mistake(lambda: _per_axis(_rms_of_end_pose(2)), "This is the rms of one coordinate, sqrt(3) smaller. Sum the squares of a pose first."),
+                Mistake(lambda: _per_axis(_rms_of_end_pose(2)), "This is the rms of one coordinate, smaller by a factor of sqrt(3). Sum the squares of a pose first.", "rms_before-19745e"),
                 Mistake(_rms_of_end_pose, "This includes the 2237 mm of pose 2. Use the measurements with that one entry repaired."),
                 Mistake(lambda: _rms_of_end_pose(*ALL_FIXED), "This uses all corrections. At this point only pose 2 is repaired."),
                 Mistake(lambda: _per_axis(_rms_of_end_pose()),

@@ -971,7 +971,7 @@ CELL = [
             ),
             Mistake(
                 lambda W, E0, E1, P: W @ invert(E0) @ E1 @ invert(W) @ P,
-                "E0^-1 E1 is the motion seen from the tracker. Between T_BW and its inverse stands the motion seen from W, E1 E0^-1.",
+                "E0^-1 E1 is the motion seen from the tracker. Between T_BW and its inverse the motion seen from W belongs, E1 E0^-1.",
                 id="moved_part-seen-from-tracker",
             ),
             Mistake(

@@ -1201,7 +1201,8 @@ RESAMPLING_SLIPS = (
     ),
     (
         _up_to_the_share,
-        "Right but for an effective size that is just the share: below it means `<`, not `<=`.",
+        "Right but for an effective size of exactly the share: below it means `<`, not `<=`.",
+        "should_resample-087af3",
     ),
     (
         lambda w, t: True,
@@ -3545,7 +3546,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a, w: math.atan((w * np.sin(a)).sum() / (w * np.cos(a)).sum()),
-                    "The plain arctan knows only half the circle. arctan2 takes both parts and knows it all.",
+                    "The plain arctan knows only half the circle. arctan2 takes both parts and knows the whole of it.",
+                    "circular_mean-8e98e4",
                 ),
             ],
         ),
