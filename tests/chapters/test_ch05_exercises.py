@@ -314,7 +314,9 @@ def test_all_poses_that_look_up_are_counted():
     down = np.tile(frames.pose(np.diag([1.0, -1, -1]), np.zeros(3)), (31, 1, 1))
     assert exercises._looks_up(down, T_FS) is None
     down[4] = np.eye(4)
-    assert exercises._looks_up(down, T_FS).startswith("one pose looks up at the sphere, with the scanner's z axis 180 deg")
+    assert exercises._looks_up(down, T_FS).startswith(
+        "one pose looks up at the sphere, with the scanner's z axis 180 deg"
+    )
     down[7] = np.eye(4)
     assert exercises._looks_up(down, T_FS).startswith("2 poses look up at the sphere")
 

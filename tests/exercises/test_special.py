@@ -7,8 +7,8 @@ from labkit.exercises import metrics, special
 HOLDS = special.right_where(
     lambda v: 2 * v,
     metrics.Numbers(1e-9, "mm"),
-    ("of a short vector", lambda rng: (rng.normal(size=2),)),
-    ("of a long vector", lambda rng: (rng.normal(size=9),)),
+    ("for a short vector", lambda rng: (rng.normal(size=2),)),
+    ("for a long vector", lambda rng: (rng.normal(size=9),)),
 )
 
 
@@ -25,12 +25,12 @@ def test_who_is_right_everywhere_hears_nothing():
 
 
 def test_the_place_is_named_with_what_is_wrong_there():
-    assert told(short_ones(lambda v: v)).startswith("right so far, but not of a long vector: the worst entry is off")
-    assert told(short_ones(lambda v: v[:2])).startswith("right so far, but not of a long vector: expected an array")
+    assert told(short_ones(lambda v: v)).startswith("right so far, but not for a long vector: the worst entry is off")
+    assert told(short_ones(lambda v: v[:2])).startswith("right so far, but not for a long vector: expected an array")
     assert told(short_ones(lambda v: v[9])).startswith(
-        "right so far, but not of a long vector: there it raises IndexError"
+        "right so far, but not for a long vector: there it raises IndexError"
     )
-    assert told(lambda v: 3 * v).startswith("right so far, but not of a short vector")
+    assert told(lambda v: 3 * v).startswith("right so far, but not for a short vector")
 
 
 def test_arguments_of_the_reference_are_not_those_of_the_answer():

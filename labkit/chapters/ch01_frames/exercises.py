@@ -591,7 +591,7 @@ CHAPTER = Chapter(
             metric=metrics.Numbers(1e-9),
             noisy=[
                 (lambda rng: (edges_on_axes(rng)[0],), metrics.Numbers(1e-9), ON_AXES),
-                (nearly_of_length_1, metrics.Numbers(1e-9), "right, but not of a vector whose length is nearly 1:"),
+                (nearly_of_length_1, metrics.Numbers(1e-9), "right, but not for a vector whose length is nearly 1:"),
             ],
             properties=(right_where(frames.unit_vector, metrics.Numbers(1e-9), *special.VECTORS),),
             hints=(
@@ -679,7 +679,7 @@ CHAPTER = Chapter(
             metric=metrics.Rotations(1e-7),
             noisy=[
                 (edges_on_axes, metrics.Rotations(1e-7), ON_AXES),
-                (nearly_at_right_angles, metrics.Rotations(1e-7), f"right, but not of short edges {NEARLY_SQUARE}"),
+                (nearly_at_right_angles, metrics.Rotations(1e-7), f"right, but not for short edges {NEARLY_SQUARE}"),
             ],
             properties=(
                 right_where(frames.gram_schmidt, metrics.Rotations(1e-7), *special.EDGES, *special.SHORT_EDGES),
@@ -782,7 +782,7 @@ CHAPTER = Chapter(
             metric=metrics.Poses(1e-6, 1e-6),
             noisy=[
                 (points_on_axes, metrics.Poses(1e-6, 1e-6), ON_AXES),
-                (nearly_square_points, metrics.Poses(1e-6, 1e-6), f"right, but not of edges {NEARLY_SQUARE}"),
+                (nearly_square_points, metrics.Poses(1e-6, 1e-6), f"right, but not for edges {NEARLY_SQUARE}"),
             ],
             properties=(right_where(frames.frame_from_points, metrics.Poses(1e-6, 1e-6), *special.TRIANGLES),),
             hints=(
@@ -856,8 +856,8 @@ CHAPTER = Chapter(
             fixed={"T": POSE},
             metric=metrics.Poses(1e-6, 1e-6),
             noisy=[
-                (shift_alone, metrics.Poses(1e-6, 1e-6), "right, but not of a pose that shifts without a turn:"),
-                (small_motion, metrics.Poses(1e-6, 1e-6), "right, but not of a small turn and a small shift:"),
+                (shift_alone, metrics.Poses(1e-6, 1e-6), "right, but not for a pose that shifts without a turn:"),
+                (small_motion, metrics.Poses(1e-6, 1e-6), "right, but not for a small turn and a small shift:"),
             ],
             properties=(right_where(frames.invert, metrics.Poses(1e-6, 1e-6), *special.POSES),),
             hints=(
@@ -1226,11 +1226,11 @@ CHAPTER = Chapter(
             fixed={"xyzabc": "a pose has six numbers"},
             metric=metrics.Poses(1e-6, 1e-6),
             noisy=[
-                (hardly_turned, metrics.Poses(1e-6, 1e-6), "right, but not of small angles:"),
+                (hardly_turned, metrics.Poses(1e-6, 1e-6), "right, but not for small angles:"),
                 (
                     functools.partial(kuka_pose, **ROUND),
                     metrics.Poses(1e-6, 1e-6),
-                    "right, but not of angles beyond 180 deg:",
+                    "right, but not for angles beyond 180 deg:",
                 ),
             ],
             properties=(right_where(frames.matrix_from_kuka, metrics.Poses(1e-6, 1e-6), *special.ANGLES),),
@@ -1567,7 +1567,7 @@ CHAPTER = Chapter(
             noisy=(
                 functools.partial(drawn_points, count=3),
                 metrics.Poses(1e-5, 1e-5),
-                "right, but not of three points, which lie in one plane wherever they are:",
+                "right, but not for three points, which lie in one plane wherever they are:",
             ),
             hints=(
                 "First the turn, about the two centers of gravity; then the shift that puts one onto the other.",

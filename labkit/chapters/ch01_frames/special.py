@@ -30,7 +30,7 @@ def vector(rng, length, signs=None):
 
 VECTORS = (
     *(
-        (f"of a {words} vector", functools.partial(vector, length=length))
+        (f"for a {words} vector", functools.partial(vector, length=length))
         for words, length in (("short", 3.0), ("tiny", 2e-8), ("very long", 1e8))  # tiny: no 0 for np.isclose
     ),
     *(
@@ -43,7 +43,7 @@ VECTORS = (
         )
     ),
     ("where a component is far smaller than the others", lambda rng: vector(rng, 70.0, signs=(1, -2e-7, 0.5))),
-    ("of an axis, whose length is 1", lambda rng: (np.array([0.0, 0.0, 1.0]),)),
+    ("for an axis, whose length is 1", lambda rng: (np.array([0.0, 0.0, 1.0]),)),
 )
 
 
@@ -68,7 +68,7 @@ def edges_along(rng, axis, sign):
 
 EDGES = (
     *(
-        (f"of {words}", functools.partial(edges, lengths=lengths, angle_deg=angle_deg))
+        (f"for {words}", functools.partial(edges, lengths=lengths, angle_deg=angle_deg))
         for words, lengths, angle_deg in (
             ("long edges", (2e4, 3e4), 60.0),
             ("edges of one length", (90.0, 90.0), 110.0),
@@ -80,7 +80,7 @@ EDGES = (
             ("a flat triangle, the origin in its middle", (250.0, 200.0), 176.0),
         )
     ),
-    ("of edges in the xy plane of W", flat_edges),
+    ("for edges in the xy plane of W", flat_edges),
     *(
         (
             f"where the first edge points {'along' if sign > 0 else 'against'} the {'xyz'[axis]} axis of W",
@@ -89,7 +89,7 @@ EDGES = (
         for axis, sign in AXES
     ),
 )
-SHORT_EDGES = (("of edges of some hundredths of a millimeter", functools.partial(edges, lengths=(0.03, 0.02))),)
+SHORT_EDGES = (("for edges of some hundredths of a millimeter", functools.partial(edges, lengths=(0.03, 0.02))),)
 
 
 def triangle(rng, draw, origin=anywhere):
@@ -149,7 +149,7 @@ KINDS_OF_POSES = (
     *((f"a pose turned about {'xyz'[axis]} alone", dict(angle=2.0, axis=axis)) for axis in range(3)),
     *((f"a pose turned by half a turn about {'xyz'[axis]}", dict(angle=HALF, axis=axis)) for axis in range(3)),
 )
-POSES = tuple((f"of {words}", lambda rng, kind=kind: (pose(rng, **kind),)) for words, kind in KINDS_OF_POSES)
+POSES = tuple((f"for {words}", lambda rng, kind=kind: (pose(rng, **kind),)) for words, kind in KINDS_OF_POSES)
 
 
 def beside(rng, angle, reach):
@@ -164,15 +164,15 @@ FRAMES = (
         for words, kind in KINDS_OF_POSES
         for k in (0, 1)
     ),
-    ("of two frames in one place, turned apart", functools.partial(beside, angle=1.4, reach=0.0)),
+    ("for two frames in one place, turned apart", functools.partial(beside, angle=1.4, reach=0.0)),
     (
-        "of two frames turned alike, a thousandth of a millimeter apart",
+        "for two frames turned alike, a thousandth of a millimeter apart",
         functools.partial(beside, angle=0.0, reach=1e-3),
     ),
-    ("of two frames turned nearly alike, far apart", functools.partial(beside, angle=6e-4, reach=500.0)),
-    ("of two frames turned apart by less than 90 deg", functools.partial(beside, angle=1.2, reach=500.0)),
-    ("of two frames turned apart by half a turn", functools.partial(beside, angle=HALF, reach=500.0)),
-    ("of two frames some meters apart", functools.partial(beside, angle=1.2, reach=3e3)),
+    ("for two frames turned nearly alike, far apart", functools.partial(beside, angle=6e-4, reach=500.0)),
+    ("for two frames turned apart by less than 90 deg", functools.partial(beside, angle=1.2, reach=500.0)),
+    ("for two frames turned apart by half a turn", functools.partial(beside, angle=HALF, reach=500.0)),
+    ("for two frames some meters apart", functools.partial(beside, angle=1.2, reach=3e3)),
 )
 
 
@@ -218,8 +218,8 @@ ANGLES = (
         )
     ),
     *((f"where {'ABC'[k]} alone is not 0", functools.partial(angles, abc=_about_one_axis(k, 0.7))) for k in range(3)),
-    ("of angles of some thousandths of a degree", functools.partial(angles, abc=(5e-5, -4e-5, 3e-5))),
-    ("of angles of some hundred-thousandths of a degree", functools.partial(angles, abc=(5e-7, -4e-7, 3e-7))),
+    ("for angles of some thousandths of a degree", functools.partial(angles, abc=(5e-5, -4e-5, 3e-5))),
+    ("for angles of some hundred-thousandths of a degree", functools.partial(angles, abc=(5e-7, -4e-7, 3e-7))),
     *(
         (f"where the position is {words}", functools.partial(angles, abc=FREE, reach=reach))
         for words, reach in (("the origin", 0.0), ("near the origin", 0.5), ("many meters away", 5e4))
@@ -267,8 +267,8 @@ READINGS = (
         for k in range(3)
     ),
     ("where A, B and C are 0", functools.partial(read_from, abc=(0.0, 0.0, 0.0))),
-    ("of angles of some thousandths of a degree", functools.partial(read_from, abc=(5e-5, -4e-5, 3e-5))),
-    ("of angles of some hundred-thousandths of a degree", functools.partial(read_from, abc=(5e-7, -4e-7, 3e-7))),
+    ("for angles of some thousandths of a degree", functools.partial(read_from, abc=(5e-5, -4e-5, 3e-5))),
+    ("for angles of some hundred-thousandths of a degree", functools.partial(read_from, abc=(5e-7, -4e-7, 3e-7))),
     *(
         (
             f"some thousandths of a degree beside B = {sign * 90} deg, where A and C still are two angles",
@@ -278,7 +278,7 @@ READINGS = (
     ),
     *(
         (
-            f"of a matrix with exact zeros, where {'ABC'[k]} is {90 * quarter} deg",
+            f"for a matrix with exact zeros, where {'ABC'[k]} is {90 * quarter} deg",
             functools.partial(read_exactly, quarters=_with_one(k, quarter)),
         )
         for k in (0, 2)
@@ -286,7 +286,7 @@ READINGS = (
     ),
     *(
         (
-            f"of a matrix with exact zeros, where A, B and C are {a * 90}, {b * 90} and {c * 90} deg",
+            f"for a matrix with exact zeros, where A, B and C are {a * 90}, {b * 90} and {c * 90} deg",
             functools.partial(read_exactly, quarters=(a, b, c)),
         )
         for a, b, c in ((1, 0, 0), (0, 0, -1), (-1, 0, 2), (0, 1, 0), (1, -1, 0), (2, 1, -1))
@@ -312,9 +312,9 @@ def two_sets(rng, count=6, angle=1.0, reach=500.0, drawing=None, noise=0.5, size
     return points_F, frames.transform(T_WF, points_F) + noise * rng.normal(size=(count, 3))
 
 
-BADLY_MEASURED = (("of points measured badly, by some ten millimeters", functools.partial(two_sets, noise=20.0)),)
+BADLY_MEASURED = (("for points measured badly, by some ten millimeters", functools.partial(two_sets, noise=20.0)),)
 SETS = tuple(
-    (f"of {words}", functools.partial(two_sets, **kind))
+    (f"for {words}", functools.partial(two_sets, **kind))
     for words, kind in (
         ("four points", dict(count=4)),
         ("five points", dict(count=5)),
@@ -335,7 +335,7 @@ SETS = tuple(
     )
 ) + tuple(  # many of them: whether a matrix that should be a rotation is a mirror image there, the processor tosses
     (
-        "of points in one plane, where the determinant of pᵀ q is nothing but rounding",
+        "for points in one plane, where the determinant of pᵀ q is nothing but rounding",
         functools.partial(two_sets_in_a_plane, count=count),
     )
     for count in (4, 5, 6, 7, 8, 9) * 3

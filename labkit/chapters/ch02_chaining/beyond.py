@@ -380,7 +380,11 @@ FILES = [
         draw=lambda rng: (system(rng),),
         fixed={"points": "a system is always three points"},
         metric=reads_back(),
-        noisy=(system_near_0, reads_back(), "right, but not of very small and very large numbers:"),
+        noisy=(
+            system_near_0,
+            reads_back(),
+            "right, but not for points among whose numbers some are tiny and some are huge:",
+        ),
         properties=(right_where(write_system, reads_back(), *SIZES),),
         hints=(
             "One line a point, blanks in between. How many digits does a double need so that none is lost?",

@@ -481,7 +481,7 @@ CHAPTER = Chapter(
             noisy=(
                 functools.partial(random_links, count=1),
                 metrics.Poses(1e-6, 1e-6),
-                "right, but not of a single link:",
+                "right, but not for a single link:",
             ),
             properties=(right_where(chain, metrics.Poses(1e-6, 1e-6), *special.CHAINS),),
             hints=(
@@ -602,7 +602,7 @@ CHAPTER = Chapter(
             fixed={"T": ONE_POSE},
             metric=CLOSURE,
             noisy=[
-                (lambda rng: (np.eye(4),), CLOSURE, "right, but not of the identity itself:"),
+                (lambda rng: (np.eye(4),), CLOSURE, "right, but not for the identity itself:"),
                 (no_turn, CLOSURE, "right, but not where T does not turn at all:"),
                 (
                     functools.partial(loop_product, between_deg=TINY),
@@ -991,7 +991,7 @@ CHAPTER = Chapter(
                 (
                     functools.partial(worn_pose, defects=defects),
                     metrics.Poses(1e-6, 1e-6),
-                    "right, but not of a block that is a little worn, as after some products:",
+                    "right, but not for a block that is a little worn, as after some products:",
                 )
                 for defects in ((1e-6, 3e-6), (1e-4, 2e-4))
             ],
@@ -1125,15 +1125,15 @@ CHAPTER = Chapter(
             draw=tuple(functools.partial(open_loop, count=n) for n in (3, 4, 7)),
             metric=metrics.Poses(1e-5, 1e-5),
             noisy=[
-                (functools.partial(open_loop, count=n), metrics.Poses(1e-5, 1e-5), f"right, but not of {words}:")
+                (functools.partial(open_loop, count=n), metrics.Poses(1e-5, 1e-5), f"right, but not for {words}:")
                 for n, words in ((2, "two links"), (1, "a single link"))
             ]
-            + [(closed_loop, metrics.Poses(1e-5, 1e-5), "right, but not of a loop that closes exactly:")]
+            + [(closed_loop, metrics.Poses(1e-5, 1e-5), "right, but not for a loop that closes exactly:")]
             + [
                 (
                     functools.partial(gap_of_one_kind, turn=turn, shift=shift),
                     metrics.Poses(1e-5, 1e-5),
-                    f"right, but not of a loop that ends {words}:",
+                    f"right, but not for a loop that ends {words}:",
                 )
                 for turn, shift, words in (
                     (0.0, 2.0, "beside its start, unturned"),

@@ -45,7 +45,7 @@ def to_and_fro(rng):
 
 CHAINS = (
     *(
-        (f"of {words} links", functools.partial(links, count=count))
+        (f"for {words} links", functools.partial(links, count=count))
         for words, count in (("five", 5), ("six", 6), ("thirty", 30))
     ),
     *(
@@ -63,7 +63,7 @@ CHAINS = (
         )
     ),
     ("where one link follows upon itself", one_link_twice),
-    ("of a way there and back", to_and_fro),
+    ("for a way there and back", to_and_fro),
 )
 
 PRODUCTS = tuple(
@@ -98,7 +98,7 @@ def block(rng, values, reach=200.0, unturned=False):
 
 BLOCKS = (
     *(
-        (f"of {words}", functools.partial(block, values=values))
+        (f"for {words}", functools.partial(block, values=values))
         for words, values in (
             ("a block that is a rotation already", (1, 1, 1)),
             ("a block three times as long as a rotation", (3, 3, 3)),
@@ -109,9 +109,9 @@ BLOCKS = (
             ("a block with a large singular value", (12, 1.5, 0.9)),
         )
     ),
-    ("of a block that is hardly turned", functools.partial(block, values=(1.1, 0.95, 0.9), unturned=True)),
+    ("for a block that is hardly turned", functools.partial(block, values=(1.1, 0.95, 0.9), unturned=True)),
     *(
-        (f"of a pose {words}", functools.partial(block, values=(1.1, 0.95, 0.9), reach=reach))
+        (f"for a pose {words}", functools.partial(block, values=(1.1, 0.95, 0.9), reach=reach))
         for words, reach in (("at the origin", 0.0), ("many meters away", 5e4))
     ),
 )
@@ -128,11 +128,11 @@ def loop(rng, count=4, angle=0.05, reach=2.0, twin=False):
 
 
 LOOPS = tuple(
-    (f"of a loop {words}", functools.partial(loop, **kind))
+    (f"for a loop {words}", functools.partial(loop, **kind))
     for words, kind in (
-        ("of five links", dict(count=5)),
-        ("of six links", dict(count=6)),
-        ("of twenty links", dict(count=20)),
+        ("for five links", dict(count=5)),
+        ("for six links", dict(count=6)),
+        ("for twenty links", dict(count=20)),
         ("that misses itself by a thousandth of a degree and of a millimeter", dict(angle=2e-5, reach=1e-3)),
         ("that misses itself by 30 deg", dict(angle=0.52)),
         ("that misses itself by more than 90 deg", dict(angle=1.9)),

@@ -29,7 +29,7 @@ def poses(rng, std_trans=0.0, between_deg=(10, 40), counts=(4, 5, 6, 8, 13)):
     return pivot.touching_poses(turns(rng, rng.choice(counts), between_deg), tip, point, 0.0, std_trans, rng)
 
 
-FEW = ((1, "right, but not of a single pose:"), (3, "right, but not of three poses:"))
+FEW = ((1, "right, but not for a single pose:"), (3, "right, but not for three poses:"))
 
 
 def of_few(metric):
@@ -429,7 +429,7 @@ CHAPTER = Chapter(
                 (  # a general minimizer is some 0.01 mm away here; what drops a direction, by many millimeters
                     functools.partial(narrow_system, between_deg=(0.8, 2), ratio=(0.006, 0.0095)),
                     metrics.Numbers(1e-3, "mm"),
-                    "right, but not of a very narrow set of poses, whose small singular values count as well:",
+                    "right, but not for a very narrow set of poses, whose small singular values count as well:",
                 )
             ],
             properties=(right_where(pivot.solve_pivot, metrics.Numbers(1e-4, "mm"), *special.SYSTEMS),),
@@ -1013,7 +1013,7 @@ CHAPTER = Chapter(
             noisy=[
                 (one_at_0, metrics.Numbers(1e-9), "right, but not where a distance is 0:"),
                 (all_far, metrics.Numbers(1e-9), "right, but not where all poses are too far away:"),
-                (one_alone, metrics.Numbers(1e-9), "right, but not of a single distance:"),
+                (one_alone, metrics.Numbers(1e-9), "right, but not for a single distance:"),
             ],
             hints=(
                 "Near poses keep their weight, far ones lose it all, smoothly.",

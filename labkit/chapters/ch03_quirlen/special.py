@@ -35,11 +35,11 @@ def one_as(change):
 
 COUNTS = ((2, "two"), (4, "four"), (7, "seven"), (12, "twelve"), (40, "forty"))
 SETS = (
-    *((f"of {words} poses", functools.partial(poses, count=count)) for count, words in COUNTS),
-    ("of poses turned by more than 90 deg", functools.partial(poses, angle=2.2)),
-    ("of poses turned by very little", functools.partial(poses, angle=1e-6)),
-    ("of poses many meters away", functools.partial(poses, reach=5e4)),
-    ("of poses next to the origin", functools.partial(poses, reach=0.1, tip=0.1, std=0.01)),
+    *((f"for {words} poses", functools.partial(poses, count=count)) for count, words in COUNTS),
+    ("for poses turned by more than 90 deg", functools.partial(poses, angle=2.2)),
+    ("for poses turned by very little", functools.partial(poses, angle=1e-6)),
+    ("for poses many meters away", functools.partial(poses, reach=5e4)),
+    ("for poses next to the origin", functools.partial(poses, reach=0.1, tip=0.1, std=0.01)),
     ("where a pose is the identity", one_as(lambda T: np.eye(4))),
     ("where a pose is half a turn, the tool upside down", one_as(lambda T: np.diag([1.0, -1.0, -1.0, 1.0]))),
     ("where a pose comes twice", one_as(lambda T: T[0])),
@@ -100,12 +100,12 @@ def of_whole_numbers(rng):
 
 
 KINDS = (
-    ("of three poses", dict(count=3)),
-    ("of four poses", dict(count=4)),
-    ("of five poses", dict(count=5)),
-    ("of twelve poses", dict(count=12)),
-    ("of forty poses", dict(count=40)),
-    ("of poses turned by more than 90 deg", dict(angle=2.2)),
+    ("for three poses", dict(count=3)),
+    ("for four poses", dict(count=4)),
+    ("for five poses", dict(count=5)),
+    ("for twelve poses", dict(count=12)),
+    ("for forty poses", dict(count=40)),
+    ("for poses turned by more than 90 deg", dict(angle=2.2)),
 )
 
 
@@ -126,9 +126,9 @@ SYSTEMS = tuple(
     (words, functools.partial(system, **kind))
     for words, kind in (
         *KINDS,
-        ("of poses next to the origin", dict(reach=3.0, tip=3.0, std=0.1)),
-        ("of poses many meters away", dict(reach=5e4)),
-        ("of poses that miss the point by some ten millimeters", dict(std=30.0)),
+        ("for poses next to the origin", dict(reach=3.0, tip=3.0, std=0.1)),
+        ("for poses many meters away", dict(reach=5e4)),
+        ("for poses that miss the point by some ten millimeters", dict(std=30.0)),
         ("where one pose is far beside the others", dict(outlier=40.0, count=12)),
     )
 )
@@ -143,11 +143,11 @@ def matrix_and_residuals(rng, std=0.5, outlier=0.0, **kind):
 RESIDUALS = tuple(
     (words, functools.partial(matrix_and_residuals, **kind))
     for words, kind in (
+        ("for a narrow set of poses", dict(angle=0.06, count=12)),  # the first: few poses are often narrow as well
         *KINDS,
-        ("of a narrow set of poses", dict(angle=0.06, count=12)),
-        ("of residuals of some hundredths of a millimeter", dict(angle=0.06, count=12, std=0.02)),
-        ("of residuals of some ten-thousandths of a millimeter", dict(std=2e-4)),
-        ("of residuals of some ten millimeters", dict(std=30.0)),
+        ("for residuals of some hundredths of a millimeter", dict(angle=0.06, count=12, std=0.02)),
+        ("for residuals of some ten-thousandths of a millimeter", dict(std=2e-4)),
+        ("for residuals of some ten millimeters", dict(std=30.0)),
         ("where one pose is far beside the others", dict(outlier=40.0, count=12)),
         ("where one pose of forty is far beside the others", dict(outlier=40.0, count=40)),
     )
@@ -177,17 +177,17 @@ DISTANCES = (
         )
     ),
     *(
-        (f"of {words} distances", functools.partial(distances, quotients=np.linspace(0.03, 1.7, count)))
+        (f"for {words} distances", functools.partial(distances, quotients=np.linspace(0.03, 1.7, count)))
         for words, count in (("two", 2), ("fifty", 50))
     ),
     *(
-        (f"of a scale {words}", functools.partial(distances, quotients=MIXED, scale=scale))
+        (f"for a scale {words}", functools.partial(distances, quotients=MIXED, scale=scale))
         for words, scale in (
-            ("of 1", 1.0),
-            ("of a whole number", 2),
+            ("for 1", 1.0),
+            ("for a whole number", 2),
             ("far below 1 mm", 0.004),
-            ("of some ten millimeters", 40.0),
+            ("for some ten millimeters", 40.0),
         )
     ),
-    ("of distances that are sorted", lambda rng: (pivot.TUKEY * np.array(sorted(MIXED)), 1.0)),
+    ("for distances that are sorted", lambda rng: (pivot.TUKEY * np.array(sorted(MIXED)), 1.0)),
 )

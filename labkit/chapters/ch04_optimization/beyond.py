@@ -53,13 +53,13 @@ def some_at_nought(rng):
 
 
 MEASURED = (  # draw, tolerance, least size it is relative to, words
-    (functools.partial(function_and_step, n=1), 1e-9, 1.0, "right, but not of a function of one unknown:"),
-    (functools.partial(function_and_step, n=8), 1e-9, 1.0, "right, but not of a function of eight unknowns:"),
+    (functools.partial(function_and_step, n=1), 1e-9, 1.0, "right, but not for a function of one unknown:"),
+    (functools.partial(function_and_step, n=8), 1e-9, 1.0, "right, but not for a function of eight unknowns:"),
     (functools.partial(function_and_step, step=(3e-5, 1e-4)), 1e-8, 1.0, "right, but not with a step below 1e-4:"),
     (functools.partial(function_and_step, step=(1, 3)), 1e-9, 1.0, "right, but not with a step above 1:"),
     (far_and_step, 1e-9, 1.0, "right, but not far from 0:"),
     (some_at_nought, 1e-9, 1.0, "right, but not where unknowns are 0:"),
-    (faint_function_and_step, 1e-7, 0.0, "right, but not of a function that hardly changes, its slopes below 1e-5:"),
+    (faint_function_and_step, 1e-7, 0.0, "right, but not for a function that hardly changes, its slopes below 1e-5:"),
 )
 
 
@@ -175,8 +175,8 @@ def rising_behind_the_end(rng):
 CHORDS = (  # draw, tolerance, least size it is relative to, words
     (both_ends, 1e-9, 1.0, "right, but not where both ends alone are looked at:"),
     (three_places, 1e-9, 1.0, "right, but not where three places are looked at:"),
-    (functools.partial(hilly, falls=False, places=(200, 400)), 1e-9, 1.0, "right, but not of hundreds of places:"),
-    (functools.partial(hilly, falls=False, unknowns=1), 1e-9, 1.0, "right, but not of a function of one unknown:"),
+    (functools.partial(hilly, falls=False, places=(200, 400)), 1e-9, 1.0, "right, but not for hundreds of places:"),
+    (functools.partial(hilly, falls=False, unknowns=1), 1e-9, 1.0, "right, but not for a function of one unknown:"),
     (one_place, 1e-9, 1.0, "right, but not where x and y are one place:"),
     (two_hills, 1e-9, 1.0, "right, but not where f rises above the chord twice, and more the second time:"),
     (
@@ -550,7 +550,7 @@ AT_THE_LIMITS = (
         _limit(better_than_promised, (1.7, 2.6), follow=no_praise_for_luck),
         "right, but not where a step to the rim brings far more than was promised. A ρ above 1 is above ¾:",
     ),
-    (taken_back_at_once, "right, but not of one round, whose step is taken back:"),
+    (taken_back_at_once, "right, but not for one round, whose step is taken back:"),
     (
         _limit(just_fair, (0.705, 0.735), follow=functools.partial(rule, good=0.7)),
         "right, but not where a step to the rim has a ρ just below ¾:",
@@ -579,7 +579,7 @@ AT_THE_LIMITS = (
         functools.partial(just_inside, share=(0.9992, 0.9998)),
         "right, but not where a good step ends at 0.9992 to 0.9998 of the radius, which counts as at the rim:",
     ),
-    (from_a_tiny_radius, "right, but not of a tiny radius, where each step ends at the rim but for rounding:"),
+    (from_a_tiny_radius, "right, but not for a tiny radius, where each step ends at the rim but for rounding:"),
 )
 
 

@@ -312,19 +312,19 @@ def from_a_stationary_place(rng):
 
 
 SPECIAL_STEPS = (
-    (uphill_promise, "right, but not of a step for which the model promises a rise:"),
-    (faint_step, "right, but not of a very short step, where all decreases are tiny:"),
+    (uphill_promise, "right, but not for a step for which the model promises a rise:"),
+    (faint_step, "right, but not for a very short step, where all decreases are tiny:"),
     (
         functools.partial(tried_step, shares=(12, 40)),
-        "right, but not of a step that brings more than ten times what was promised:",
+        "right, but not for a step that brings more than ten times what was promised:",
     ),
     (
         functools.partial(tried_step, shares=(-40, -12)),
-        "right, but not of a step that raises the cost by more than ten times of what it was promised to fall:",
+        "right, but not for a step that raises the cost by more than ten times of what it was promised to fall:",
     ),
-    (nothing_brought, "right, but not of a step that leaves the cost as it was:"),
+    (nothing_brought, "right, but not for a step that leaves the cost as it was:"),
     (costly_step, "right, but not where costs are in the millions:"),
-    (from_a_stationary_place, "right, but not of a step from where g is 0:"),
+    (from_a_stationary_place, "right, but not for a step from where g is 0:"),
 )
 TRIED_STEPS = tuple(functools.partial(tried_step, shares=s) for s in ((0.2, 1.2), (-0.8, -0.2)))
 
@@ -376,8 +376,8 @@ def close_to_the_rim(rng, step, share):
 
 JUST_WITHIN, JUST_OUTSIDE = (0.995, 0.999), (1.001, 1.005)
 SPECIAL_DOGLEGS = (
-    (functools.partial(scaled_dogleg, size=1e-6), "right, but not of a radius near 1e-5:"),
-    (functools.partial(scaled_dogleg, size=1e4), "right, but not of a radius in the ten thousands:"),
+    (functools.partial(scaled_dogleg, size=1e-6), "right, but not for a radius near 1e-5:"),
+    (functools.partial(scaled_dogleg, size=1e4), "right, but not for a radius in the ten thousands:"),
     (functools.partial(dogleg_along, of="B"), "right, but not where B is diagonal:"),
     (functools.partial(dogleg_along, of="g"), "right, but not where g lies along an axis:"),
     (dogleg_at_rest, "right, but not where g is 0 and the step with it:"),
@@ -1703,13 +1703,13 @@ CHAPTER = Chapter(
             noisy=[
                 (functools.partial(damped_case, m=m, n=n, damping=damping), metrics.Numbers(1e-7, least=least), words)
                 for m, n, damping, least, words in (
-                    (3, 3, 2.0, 1.0, "right, but not of as many residuals as unknowns:"),
-                    (3, 3, 0.0, 1.0, "right, but not of as many residuals as unknowns, without damping:"),
-                    (1, 1, 2.0, 1.0, "right, but not of one residual and one unknown:"),
-                    (60, 8, 2.0, 1.0, "right, but not of sixty residuals and eight unknowns:"),
-                    (6, 3, 3e-4, 1.0, "right, but not of little damping:"),
-                    (6, 3, 1e4, 1.0, "right, but not of much damping:"),
-                    (6, 3, 1e7, 0.0, "right, but not of so much damping that the step is tiny:"),
+                    (3, 3, 2.0, 1.0, "right, but not for as many residuals as unknowns:"),
+                    (3, 3, 0.0, 1.0, "right, but not for as many residuals as unknowns, without damping:"),
+                    (1, 1, 2.0, 1.0, "right, but not for one residual and one unknown:"),
+                    (60, 8, 2.0, 1.0, "right, but not for sixty residuals and eight unknowns:"),
+                    (6, 3, 3e-4, 1.0, "right, but not for little damping:"),
+                    (6, 3, 1e4, 1.0, "right, but not for much damping:"),
+                    (6, 3, 1e7, 0.0, "right, but not for so much damping that the step is tiny:"),
                 )
             ]
             + [
@@ -2105,7 +2105,7 @@ CHAPTER = Chapter(
             noisy=[
                 (draw, ITERATE, words)
                 for draw, words in (
-                    (beyond.no_rounds, "right, but not of no rounds at all:"),
+                    (beyond.no_rounds, "right, but not for no rounds at all:"),
                     (
                         beyond.residuals_that_are_x,
                         "right, but not where `residual` returns the very x that it is given (is that x changed before the "

@@ -112,9 +112,9 @@ def two_motions(rng, turn=1.0, far=2.0):
 
 
 SPECIAL_MOTIONS = (
-    (functools.partial(two_motions, far=1500.0), "right, but not of motions over a meter:"),
-    (functools.partial(two_motions, turn=0.0), "right, but not of motions that do not turn:"),
-    (functools.partial(two_motions, turn=1e-4), "right, but not of motions that hardly turn:"),
+    (functools.partial(two_motions, far=1500.0), "right, but not for motions over a meter:"),
+    (functools.partial(two_motions, turn=0.0), "right, but not for motions that do not turn:"),
+    (functools.partial(two_motions, turn=1e-4), "right, but not for motions that hardly turn:"),
 )
 
 
@@ -169,7 +169,7 @@ def long_base(rng):
 OTHER_TRIANGLES = (
     (flat_triangle, "right, but not where both angles are below 3°:"),
     (isosceles, "right, but not where both angles are alike:"),
-    (long_base, "right, but not of a base longer than 100 m:"),
+    (long_base, "right, but not for a base longer than 100 m:"),
 )
 
 
@@ -180,12 +180,12 @@ def with_noise(rng, draw, std):
 
 SPECIAL_NOISE = (
     *((functools.partial(with_noise, draw=draw, std=0.005), words) for draw, words in OTHER_TRIANGLES),
-    (functools.partial(with_noise, draw=triangle, std=1e-8), "right, but not of angles that err by 1e-8 rad only:"),
+    (functools.partial(with_noise, draw=triangle, std=1e-8), "right, but not for angles that err by 1e-8 rad only:"),
     (
         functools.partial(with_noise, draw=triangle, std=0.2),
-        "right, but not of angles that err by 0.2 rad. To first order it is the derivative times std there too:",
+        "right, but not for angles that err by 0.2 rad. To first order it is the derivative times std there too:",
     ),
-    (functools.partial(with_noise, draw=triangle, std=0.0), "right, but not of angles that do not err:"),
+    (functools.partial(with_noise, draw=triangle, std=0.0), "right, but not for angles that do not err:"),
 )
 
 
@@ -233,9 +233,9 @@ def always_there(rng):
 
 OTHER_ARRIVALS = (  # draw, least size that the tolerance is relative to, words
     (functools.partial(arrivals, d=1), 1.0, "right, but not along a line, d = 1:"),
-    (functools.partial(arrivals, d=6), 1.0, "right, but not of six coordinates, d = 6:"),
-    (functools.partial(arrivals, numbers=(200, 300)), 1.0, "right, but not of 200 arrivals and more:"),
-    (close_arrivals, 0.0, "right, but not of arrivals within micrometers:"),
+    (functools.partial(arrivals, d=6), 1.0, "right, but not for six coordinates, d = 6:"),
+    (functools.partial(arrivals, numbers=(200, 300)), 1.0, "right, but not for 200 arrivals and more:"),
+    (close_arrivals, 0.0, "right, but not for arrivals within micrometers:"),
     (one_astray, 1.0, "right, but not where one arrival is far from all others. It counts like them:"),
     (always_there, 1.0, "right, but not where all arrivals are at one place:"),
 )
@@ -930,14 +930,14 @@ LITERATURE = [
             (
                 first_ones_on_a_line,
                 metrics.Rotations(0.5),
-                "right without noise, but not of noisy poses that lie nearly on a line, all but three (are all heard?):",
+                "right without noise, but not for noisy poses that lie nearly on a line, all but three (are all heard?):",
             ),
             *2  # a turn about the line that nothing tells may be nearly right by chance
             * (
                 (
                     functools.partial(first_ones_on_a_line, numbers=(40, 50)),
                     metrics.Rotations(0.5),
-                    "right without noise, but not of 40 noisy poses and more nearly on a line, all but three (are all heard?):",
+                    "right without noise, but not for 40 noisy poses and more nearly on a line, all but three (are all heard?):",
                 ),
             ),
             (
@@ -1058,12 +1058,12 @@ LITERATURE = [
             (
                 first_ones_turned_alike,
                 NOISY_STEP_2,
-                "right without noise, but not of noisy poses that hardly turn, all but four (are all heard?):",
+                "right without noise, but not for noisy poses that hardly turn, all but four (are all heard?):",
             ),
             (
                 functools.partial(first_ones_turned_alike, numbers=(40, 50)),
                 NOISY_STEP_2,
-                "right without noise, but not of 40 noisy poses and more that hardly turn, all but four (are all heard?):",
+                "right without noise, but not for 40 noisy poses and more that hardly turn, all but four (are all heard?):",
             ),
         ),
         hints=(

@@ -107,7 +107,7 @@ SPECIAL_KUKA = (
     ),
     (
         functools.partial(kuka_turned, B=2.0, further=2 * np.pi),
-        "right, but not of angles beyond a half turn, or of a B beyond 90°:",
+        "right, but not for angles beyond a half turn, or of a B beyond 90°:",
     ),
     (kuka_almost_there, "right, but not where all residuals are below 0.001 mm:"),
 )
@@ -201,17 +201,17 @@ def returning_a_view(rng):
 
 
 SPECIAL_FUNCTIONS = (  # what is special, tolerance, least size it is relative to, words
-    ({"m": 3, "n": 3}, 1e-9, 1.0, "right, but not of as many values as variables:"),
-    ({"m": 2, "n": 8}, 1e-9, 1.0, "right, but not of eight variables:"),
+    ({"m": 3, "n": 3}, 1e-9, 1.0, "right, but not for as many values as variables:"),
+    ({"m": 2, "n": 8}, 1e-9, 1.0, "right, but not for eight variables:"),
     ({"step": (3e-5, 1e-4)}, 1e-8, 1.0, "right, but not with a step below 1e-4:"),
     ({"step": (1, 3)}, 1e-9, 1.0, "right, but not with a step above 1:"),
     ({"away": 20.0}, 1e-9, 1.0, "right, but not far from 0:"),
-    ({"size": 1e-7}, 1e-7, 0.0, "right, but not of a function that hardly changes, its derivatives below 1e-4:"),
+    ({"size": 1e-7}, 1e-7, 0.0, "right, but not for a function that hardly changes, its derivatives below 1e-4:"),
 )
 
 
 VIEW = (
-    "right, but not of a function that returns a view of the array it is given, such as `x[::-1]` (is that array changed "
+    "right, but not for a function that returns a view of the array it is given, such as `x[::-1]` (is that array changed "
     "before what came back is used?):"
 )
 
@@ -266,7 +266,7 @@ SPECIAL_PROFILES = (
         (
             functools.partial(profile, side=1, across=-1, size=size),
             metrics.Numbers(1e-6, "mm"),
-            f"right, but not of a sphere {words}:",
+            f"right, but not for a sphere {words}:",
         )
         for size, words in ((0.05, "of a millimeter or two"), (20, "half a meter large and more"))
     ),
@@ -304,8 +304,8 @@ def residuals_of_all_lengths(rng):
 
 SPECIAL_RESIDUALS = (
     (functools.partial(residuals_with_outliers, gross=0), "right, but not where no pose is off:"),
-    (functools.partial(residuals_with_outliers, n=3, gross=1), "right, but not of three poses:"),
-    (functools.partial(residuals_with_outliers, n=100, gross=30), "right, but not of a hundred poses:"),
+    (functools.partial(residuals_with_outliers, n=3, gross=1), "right, but not for three poses:"),
+    (functools.partial(residuals_with_outliers, n=100, gross=30), "right, but not for a hundred poses:"),
     (
         functools.partial(residuals_with_outliers, size=2e-3),
         "right, but not where most residuals are some thousandths of a millimeter:",
@@ -1011,10 +1011,10 @@ CHAPTER = Chapter(
             metric=ANY_CIRCLE,
             noisy=(
                 *5 * ((lambda rng: arc(rng, 0.001), NOISY_CIRCLE),),
-                (lambda rng: arc(rng, 0.001, n=600), NOISY_CIRCLE, "right, but not of a scan line of 600 noisy points:"),
-                *((functools.partial(sized_arc, size=size), ANY_CIRCLE, f"right, but not of a circle of {words}:")
+                (lambda rng: arc(rng, 0.001, n=600), NOISY_CIRCLE, "right, but not for a scan line of 600 noisy points:"),
+                *((functools.partial(sized_arc, size=size), ANY_CIRCLE, f"right, but not for a circle of {words}:")
                   for size, words in ((0.02, "half a millimeter"), (50, "a meter and more"))),
-                (arc_elsewhere, ANY_CIRCLE, "right, but not of a circle whose center is next to x = 0, with a negative z:"),
+                (arc_elsewhere, ANY_CIRCLE, "right, but not for a circle whose center is next to x = 0, with a negative z:"),
             ),
             hints=(
                 "A circle is linear in the right unknowns: multiply (x - xc)^2 + (z - zc)^2 = r^2 out.",
@@ -1247,7 +1247,7 @@ CHAPTER = Chapter(
             draw=tuple(lambda rng, n=n: pose_off(rng, n)[:3] for n in COUNTS),
             fixed={"T_FS": POSE},
             metric=metrics.Numbers(1e-6),  # good differences are right as well
-            noisy=((close_to_the_scanner, metrics.Numbers(1e-5), "right, but not of a sphere within a millimeter of the scanner's origin:"),),
+            noisy=((close_to_the_scanner, metrics.Numbers(1e-5), "right, but not for a sphere within a millimeter of the scanner's origin:"),),
             hints=(
                 "Insert T_FS exp(phi) into the residual and keep what is linear in phi and in the translation.",
                 "R_BF R_FS exp(phi) x = R_BF R_FS (x + phi x x) = ... - R_BF R_FS [x] phi; the translation enters through R_BF alone.",
@@ -1295,7 +1295,7 @@ CHAPTER = Chapter(
             noisy=(
                 (uphill, metrics.Poses(1e-5, 1e-5), "right, but not from a start so far off that the residuals grow with the step. Gauss-Newton takes it whole all the same:"),
                 (functools.partial(pose_off, turn=1e-6, shift=1e-4), metrics.Poses(1e-6, 1e-6), "right, but not from a start that is off by less than 0.001 mm and a millionth of a rad:"),
-                (few_poses, metrics.Poses(1e-4, 1e-4), "right, but not of three poses:"),
+                (few_poses, metrics.Poses(1e-4, 1e-4), "right, but not for three poses:"),
                 (fitting_exactly, metrics.Poses(1e-6, 1e-6), "right, but not from a start that fits exactly, from where the step is 0:"),
                 (one_far_off, metrics.Poses(1e-5, 1e-5), "right, but not where one sphere center is far off. Gauss-Newton's step hears it like all others:"),
             ),
@@ -1418,7 +1418,7 @@ CHAPTER = Chapter(
                    (first_ones_alike, LinearStart(0.4, 2.0, 2e-3),
                     "exact on clean data, but not where only the last of the noisy poses turn far (are all heard?):"),
                    (functools.partial(first_ones_alike, numbers=(60, 70), turn=1e-4), LinearStart(0.4, 2.0, 2e-3),
-                    "exact on clean data, but not of 60 noisy poses and more of which only the last ones turn far (are all heard?):")),
+                    "exact on clean data, but not for 60 noisy poses and more of which only the last ones turn far (are all heard?):")),
             hints=(
                 "Forget for a moment that R_FS is a rotation: then all unknowns enter linearly.",
                 "R_FS x + t_FS - R_BF^T target = -R_BF^T t_BF. Fifteen unknowns: nine of R_FS, three of t_FS, three of the target. A pose gives three rows: `np.kron(np.eye(3), x)` for R_FS row by row, then `np.eye(3)`, then -R_BF^T. Solve all rows, and take `nearest_rotation` of the first nine.",

@@ -1407,7 +1407,7 @@ def _moved(particles, lead=""):
 
 
 _moved_by_the_rng = _moved(3)
-_moved_alone_by_the_rng = _moved(1, "of a single particle, but not of several: ")
+_moved_alone_by_the_rng = _moved(1, "of a single particle, but not for several: ")
 
 
 def _valid(resample, rng):
