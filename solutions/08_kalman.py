@@ -63,7 +63,7 @@ def predict_state(x, cov, A, B, u, cov_u):
 @ex.update
 def update(x, cov, z, C, cov_z):
     """Return state and covariance after the measurement z, shape (m,), with C (m, n)
-    and cov_z (m, m)."""
+    and cov_z (m, m); no covariance is singular."""
     ### BEGIN SOLUTION
     K = cov @ C.T @ np.linalg.inv(C @ cov @ C.T + cov_z)
     return x + K @ (z - C @ x), (np.eye(len(x)) - K @ C) @ cov
@@ -468,7 +468,8 @@ for std_a in (4000.0, 400.0):
 # %% batch_estimate
 @ex.batch_estimate
 def batch_estimate(x0, cov0, z, C, cov_z):
-    """Return state and covariance from all measurements z, shape (k, m), at once."""
+    """Return state and covariance from all measurements z, shape (k, m), at once; no
+    covariance is singular."""
     ### BEGIN SOLUTION
     N, b = np.linalg.inv(cov0), np.linalg.solve(cov0, x0)
     for one in z:

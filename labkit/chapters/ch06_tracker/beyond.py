@@ -327,12 +327,12 @@ def few_readings_in_motion(rng):
     return speed, np.hypot(e0, lag * speed)
 
 
-def readings_in_motion(rng, n=None):
+def readings_in_motion(rng, n=None, each=1):
     """Speeds, mm/s, and errors, mm, of a motion whose tracker lags; the squares scatter about their line, which meets
-    the axis well above 0: what a negative e0^2 means, the docstring does not say.
+    the axis well above 0: what a negative e0^2 means, the docstring does not say. each: readings at one speed.
     """
     while True:
-        speed = rng.uniform(20, rng.uniform(900, 1800), n or int(rng.integers(30, 60)))
+        speed = np.repeat(rng.uniform(20, rng.uniform(900, 1800), n or int(rng.integers(30, 60))), each)
         squares = rng.uniform(3, 9) ** 2 + (rng.uniform(0.008, 0.03) * speed) ** 2
         squares *= 1 + 0.1 * rng.uniform(-1, 1, len(speed))
         slope, intercept = np.polyfit(speed**2, squares, 1)
@@ -796,6 +796,11 @@ SPEEDS = [
                 "right, but not for slow motions, a few mm/s and errors of micrometers:",
             ),
             (few_readings_in_motion, ERROR_AND_LAG, "right, but not for three readings:"),
+            (
+                functools.partial(readings_in_motion, each=2),
+                ERROR_AND_LAG,
+                "right, but not for several readings at one speed:",
+            ),
             (functools.partial(readings_in_motion, n=200), ERROR_AND_LAG, "right, but not for 200 readings:"),
         ),
         hints=(
