@@ -595,6 +595,17 @@ def _called(call):
     return getattr(call.func, "attr", getattr(call.func, "id", ""))
 
 
+def what_stays(code):
+    """What stands alone in a line that loses its only bound, where the bound is a number, as the end of a sentence."""
+    try:
+        nodes = list(ast.walk(ast.parse(code)))
+    except SyntaxError:  # a line that is cut
+        return ""
+    bounds = [node for node in nodes if isinstance(node, ast.Call) and _called(node) in BOUNDED | BOUNDS]
+    kept = [part for call in bounds for part in call.args if _number(part) is None]
+    return f", so that `{ast.unparse(kept[0])}` stands alone" if len(bounds) == len(kept) == 1 else ""
+
+
 def _limits(call):
     """Between which numbers, typed in, a call keeps what it is given; None where it does not."""
     name, numbers = _called(call), [_number(part) for part in call.args]

@@ -284,7 +284,9 @@ class Search:
             return None
         told = self._left_out_instead(plan[1])
         _, line, code, mends = changes[told]
-        mends = self._of_truth(mends) + self._if_at_all(told)
+        mends = (
+            self._of_truth(mends) + self._if_at_all(told) + (mutation.what_stays(code) if mends in UNBOUNDED else "")
+        )
         words = self._whatever_words(line, code, mends) or self._weight_words(line, code, mends)
         words = words or self._settled_words(line, mends)
         return words or f"in line {line}, `{code}`: {mends}. {self._alone()}"

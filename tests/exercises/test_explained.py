@@ -255,6 +255,8 @@ def test_what_is_tried_as_explanation_writes_nothing_on_the_terminal(capfd):
         for decompose in (np.linalg.lstsq, np.linalg.pinv, np.linalg.svd):
             with pytest.raises(np.linalg.LinAlgError, match="holds NaN"):
                 decompose(np.full((3, 3), np.nan), *([np.ones(3)] if decompose.__name__ == "lstsq" else []))
+        with pytest.raises(np.linalg.LinAlgError, match="holds NaN"):
+            np.polyfit(np.full(3, np.nan), np.ones(3), 1)
     assert capfd.readouterr() == ("", "")
 
 
