@@ -48,8 +48,8 @@ class Defaults:
         """What is told where the function is right with all that it keeps as at first in every call."""
         if self.changed:
             return (
-                f"what one call puts into {self.changed_names} is still there in the next. With that as it was at "
-                "first in every call, this is right: make it within the function."
+                f"what one call puts into {self.changed_names} is still there in the next. Begun anew in every "
+                "call, within the function, your result is right."
             )
         code = self.function.__code__
         names = code.co_varnames[code.co_argcount - len(self.first) : code.co_argcount]

@@ -240,7 +240,7 @@ class Explanations(Named):
         names = self._names(draws[0][0])
         for k, name in enumerate(names):
             if name in told and any(self._moves(k, *pair) for pair in self._exchanges(k, draws)):
-                return f"your function {told[name]} `{name}`, and its result should change with it"
+                return f"your function {told[name]} `{name}`, and the result should change with `{name}`"
         if self._is_nothing_but_zeros():
             return "your result is nothing but zeros, on every draw of this check"
         for k, name in enumerate(names):

@@ -121,7 +121,7 @@ def _succeeds(student, args, expected, metric, aloud):
 def _told(names, changed, args):
     given = ", ".join(_given(names[k], args[k]) for k in changed)
     return (
-        f"right, but not for whole numbers: of {given} it makes something else than of the same numbers with a "
+        f"right, but not for whole numbers: for {given} your result is another one than for the same numbers with a "
         "decimal point. Does it make an array of the kind that is given, with `zeros_like`, `copy`, `np.array` or "
         "`dtype=`? Such an array holds whole numbers too, and cuts decimals off: `dtype=float` keeps them."
     )

@@ -75,7 +75,7 @@ def in_rows_like_the_tip(T_WF, tip, point):
 )
 def test_decimals_that_are_cut_off_are_told(item, answer, given):
     outcome = judged(item, answer)
-    assert outcome.status == NOT_YET and outcome.text.startswith("right, but not for whole numbers: of ")
+    assert outcome.status == NOT_YET and outcome.text.startswith("right, but not for whole numbers: for ")
     assert given in outcome.text  # alone, or with the others where already a last bit of all of them is cut off
 
 

@@ -450,7 +450,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda A, b: np.linalg.pinv(A, rcond=0.1) @ b,
-                    "Small singular values are dropped here, such as lie a little below a tenth of the largest. Narrow poses have them, and they count.",
+                    "Singular values below a tenth of the largest are dropped here. Narrow poses have such small ones, and they count.",
                     id="solve-cut",
                 ),
                 Mistake(
@@ -779,7 +779,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.sqrt(_squares() / 11),
-                    "This divides by n - 1. Nothing was estimated as a mean here: the sheet divides by the 12 poses.",
+                    "This divides by n - 1. The sheet divides by n, the 12 poses.",
                     id="s0-188dc3",
                 ),
                 Mistake(lambda: np.sqrt(_squares()), "The division by n is missing under the root."),
@@ -801,7 +801,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.sqrt(_squares() / 35),
-                    "This divides by 36 - 1 (`ddof=1`). Nothing was estimated as a mean here: the sheet divides by the 12 poses.",
+                    "This divides by 36 - 1 (`ddof=1`). The sheet divides by the 12 poses.",
                     id="s0-c439df",
                 ),
                 Mistake(

@@ -468,7 +468,8 @@ class KeptOrNot(metrics.Exactly):
         if np.asarray(expected).dtype != bool:
             return super().deviations(result, expected)
         kept, refused = int((result & ~expected).sum()), int((~result & expected).sum())
-        words = f"of {len(expected)} values you keep {kept} that should go, and refuse {refused} that should stay"
+        parts = [f"keep {kept} that should go"] * bool(kept) + [f"refuse {refused} that should stay"] * bool(refused)
+        words = f"of {len(expected)} values you {' and '.join(parts)}"
         return [metrics.Deviation("", float(kept + refused), "", 0.5, words=words)]
 
 
