@@ -946,8 +946,6 @@ REVERSED = (  # (words of what was changed in a right formula, what is wrong whe
     (r"with the root of one part taken", "the root of this belongs there"),
     (IN_DEGREES, "this belongs there in degrees"),
     (r"along another axis in one call", "the axis is another one"),
-    (SECOND_LIKE_FIRST, "the first of the two values belongs there in all cases"),
-    (FIRST_LIKE_SECOND, "the second of the two values belongs there in all cases"),
     (r"with ([01]) in the place of one part", r"\1 belongs in the place of this"),
     (r"with one slice taken to the end", "what stands behind this slice is left out, and belongs there"),
     (r"with one slice taken from the start", "what stands before this slice is left out, and belongs there"),
@@ -969,6 +967,8 @@ def _mends(words, node, new):
         return ""
     if isinstance(node, ast.BinOp) and (new is node.left or new is node.right):
         return _left_out(node, new)
+    if words in (SECOND_LIKE_FIRST, FIRST_LIKE_SECOND):
+        return f"`{ast.unparse(new)}` belongs there in all cases"
     for said, told in REVERSED:
         if re.fullmatch(said, words):
             told = re.sub(said, told, words)

@@ -908,7 +908,7 @@ def answer(pose, z, landmarks, std_range, std_bearing):
 
 
 def test_of_a_pose_the_heading_alone_is_to_be_wrapped():
-    assert "`pose[2]`: it belongs there wrapped" in judge("landmark_weight", typed(FOLDED)).text
+    assert "`pose[2]`: it should be wrapped" in judge("landmark_weight", typed(FOLDED)).text
 
 
 def test_random_numbers_that_change_nothing_are_no_missing_ones():

@@ -68,7 +68,7 @@ def status(printed, value, bound, misprint, simulated):
         ("off <= half:", "np.isclose(value, x, atol=half):", "right"),
         ("off <= half + bound", "np.isclose(value, x, rtol=1e-3, atol=half + bound)", "and into its other calls"),
         ("half_unit(printed)", "half_unit(str(x))", "43.00 has two decimals"),
-        ('return "misprint" if', 'return "rounding" if bound else "misprint" if', "of the two values belongs there"),
+        ('return "misprint" if', 'return "rounding" if bound else "misprint" if', "belongs there in all cases"),
     ],
 )  # fmt: skip
 def test_a_word_that_is_wrong_in_one_case(right, wrong, told):

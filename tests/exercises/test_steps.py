@@ -1134,7 +1134,7 @@ def several(rng):
         (
             _clipped,
             "return np.where(a < 0, 0.0, np.where(a > 2, 2.0, a))",
-            "the second of the two values belongs there in all cases.",
+            "belongs there in all cases.",
         ),
         (
             _clipped,
