@@ -1151,6 +1151,15 @@ CELL = [
                 "You added the standard deviations of the three axes. Squares add: the root of the trace.",
                 id="shares-linear",
             ),
+            *(
+                Mistake(
+                    _each(lambda J, C, sign=sign: np.linalg.norm(J @ (sign(C) * np.sqrt(np.abs(C))))),
+                    "You took the root of the covariance entry by entry. What makes it by L Lᵀ is another matrix, such as that "
+                    "of Cholesky; without it, the root of trace(J C Jᵀ) will do.",
+                    id=f"shares-root-of-entries{end}",
+                )
+                for sign, end in ((np.sign, ""), (np.ones_like, "-unsigned"))
+            ),
             Mistake(
                 _each(lambda J, C: np.sqrt(np.trace(J @ _variances(C) @ J.T))),
                 "You used the variances of the parameters alone. Those of one calibration are correlated: take all of its covariance.",

@@ -962,6 +962,11 @@ SUSPECTS = Exercise(
             "You accuse nobody where several could have slipped. Wanted are all of them.",
         ),
         Mistake(
+            lambda entries, average: {(k + 1) % (len(entries) + 1) for k in suspects(entries, average)},
+            "Your positions count from the average, as if it stood in front. Entries count from 0, and the average "
+            "stands behind them, at len(entries).",
+        ),
+        Mistake(
             _search(slips=lambda text: list(single_slips(text))[:1]),
             "You try the first slip of each number only. Does a `return` end the loop in its first round?",
         ),
