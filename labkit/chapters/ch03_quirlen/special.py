@@ -144,6 +144,7 @@ RESIDUALS = tuple(
     (words, functools.partial(matrix_and_residuals, **kind))
     for words, kind in (
         ("for a narrow set of poses", dict(angle=0.06, count=12)),  # the first: few poses are often narrow as well
+        ("for a very narrow set of poses", dict(angle=0.012, count=12)),
         *KINDS,
         ("for residuals of some hundredths of a millimeter", dict(angle=0.06, count=12, std=0.02)),
         ("for residuals of some ten-thousandths of a millimeter", dict(std=2e-4)),

@@ -103,13 +103,14 @@ def bowl(rng):
     return (lambda x: float(((A @ (x - c)) ** 2).sum())), *rng.normal(scale=2.0, size=(2, n)), int(rng.integers(5, 40))
 
 
-def hilly(rng, falls, unknowns=None, places=(6, 20)):
+def hilly(rng, falls, unknowns=None, places=(6, 20), across=False):
     """A function that rises above its chord off the middle, from its higher end or to it, and sags elsewhere, more than
-    it rises where it falls.
+    it rises where it falls. across: both ends have the same first coordinate.
     """
     while True:
         f, x = wavy(rng, unknowns)
         y, n = x + rng.normal(scale=1.5, size=len(x)), int(rng.integers(*places))
+        y[0] = x[0] if across else y[0]
         _, values, heights = chord(f, x, y, n)
         gap = values - heights
         off_middle = gap.max() - gap[n // 2] > 0.05 * gap.max() and 1 < np.argmax(gap) < n - 2
@@ -177,6 +178,12 @@ CHORDS = (  # draw, tolerance, least size it is relative to, words
     (three_places, 1e-9, 1.0, "right, but not where three places are looked at:"),
     (functools.partial(hilly, falls=False, places=(200, 400)), 1e-9, 1.0, "right, but not for hundreds of places:"),
     (functools.partial(hilly, falls=False, unknowns=1), 1e-9, 1.0, "right, but not for a function of one unknown:"),
+    (
+        functools.partial(hilly, falls=False, unknowns=3, across=True),
+        1e-9,
+        1.0,
+        "right, but not where x and y have the same first coordinate:",
+    ),
     (one_place, 1e-9, 1.0, "right, but not where x and y are one place:"),
     (two_hills, 1e-9, 1.0, "right, but not where f rises above the chord twice, and more the second time:"),
     (

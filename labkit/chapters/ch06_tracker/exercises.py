@@ -42,9 +42,10 @@ DECODED = metrics.Several(
 )
 
 
-def _packet(rng, sign, times=1.0, way=1.0):
-    """A good packet with all fields different, its quaternion of either sign; times, way: how much later and farther off."""
-    T = pose(exp_so3(rng.normal(size=3)), way * rng.uniform(-900, 900, 3))
+def _packet(rng, sign, times=1.0, way=None):
+    """A good packet with all fields different, its quaternion of either sign; times: how much later; way: how far off, mm."""
+    place = rng.uniform(-900, 900, 3)
+    T = pose(exp_so3(rng.normal(size=3)), place if way is None else way * place / np.linalg.norm(place))
     values = packet_from_pose(
         T, times * rng.uniform(1, 900), velocity=rng.uniform(50, 300, 3), angular_velocity=rng.uniform(0.1, 1, 3)
     )
@@ -746,12 +747,12 @@ CHAPTER = Chapter(
             metric=DECODED,
             noisy=(
                 (
-                    functools.partial(_packet, sign=1, times=1e5, way=6.0),
+                    functools.partial(_packet, sign=1, times=1e5, way=9e3),
                     DECODED,
-                    "right, but not after a day, or some meters off:",
+                    "right, but not after a day, or nine meters off:",
                 ),
                 (
-                    functools.partial(_packet, sign=-1, times=1e-4, way=1e-4),
+                    functools.partial(_packet, sign=-1, times=1e-4, way=0.05),
                     DECODED,
                     "right, but not in the first tenth of a second, within a tenth of a millimeter:",
                 ),

@@ -250,9 +250,11 @@ def long_ray(rng):
 
 
 def short_ray(rng):
-    """The same with an r_max a little before the wall."""
-    ray, r = long_ray(rng)
-    return *ray, r - 0.3
+    """The same with an r_max a little before the wall, and the next whole meter behind it."""
+    while True:
+        ray, r = long_ray(rng)
+        if math.ceil(r - 0.3) > r + 0.2:
+            return *ray, r - 0.3
 
 
 def ray_that_just_arrives(rng):
