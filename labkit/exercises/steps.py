@@ -345,9 +345,10 @@ class Search:
             among = any(np.ptp(value) for value in drawn)
             differ = among or np.ptp([value.flat[0] for value in drawn]) > 0
             if differ and self.mending([("value", k, rerun.ALWAYS_THE_SAME[1], None)]):
-                one = "True" if _is_condition(self.written.places[k][1]) else "1"
+                one = "True" if k in self.written.of_truth else "1"
                 one = f"{one} everywhere" if among else one
-                return f"{self._where(k)}: with {one} in its place, {RIGHT}, so perhaps it is not needed."
+                there = "on the right side" if self._binds(k) else "in its place"
+                return f"{self._where(k)}: with {one} {there}, {RIGHT}, so perhaps it is not needed."
         return None
 
     def _may_be_said(self, mends):
@@ -932,14 +933,6 @@ def _closed(words):
 def _bare(code):
     """A part of the code without the larger one in which it is quoted."""
     return code.partition(rerun.WITHIN)[0]
-
-
-def _is_condition(code):
-    """Whether what code binds is made of comparisons: an array of True and False."""
-    value = getattr(ast.parse(code).body[0], "value", None)
-    logical = isinstance(value, ast.BinOp) and isinstance(value.op, ast.BitAnd | ast.BitOr)
-    inverse = isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.Invert)
-    return logical or inverse or isinstance(value, ast.Compare | ast.BoolOp)
 
 
 def _bound(code, name):

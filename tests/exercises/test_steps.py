@@ -205,7 +205,7 @@ def test_a_weight_that_nothing_is_to_be_multiplied_by_is_told_whole():
         w = 1 / (1 + (a - a.mean()) ** 2)
         return len(b) * np.linalg.norm(w * r)
     """
-    said = "in line 4, `w = 1 / (1 + (a - a.mean()) ** 2)`: with 1 everywhere in its place, your result is right"
+    said = "in line 4, `w = 1 / (1 + (a - a.mean()) ** 2)`: with 1 everywhere on the right side, your result is right"
     assert said in told(body)
 
 
@@ -216,7 +216,7 @@ def test_a_mask_that_leaves_nothing_out_is_true_everywhere():
         return a[kept] * b[kept]
     """
     text = item.judge(typed(body), rng=np.random.default_rng(0)).text
-    assert "n line 2, `kept = a**2 - b**2 > 0`: with True everywhere in its place, your result is right" in text
+    assert "n line 2, `kept = a**2 - b**2 > 0`: with True everywhere on the right side, your result is right" in text
 
 
 @pytest.mark.parametrize("put", ["np.ones(3)", "np.arange(3.0)"])

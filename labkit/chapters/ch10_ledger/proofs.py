@@ -596,6 +596,21 @@ def printed_twice(rng):
             return entries, average
 
 
+def of_other_digits(rng):
+    """A column in which somebody is suspected, or is not, by what rounding of the numbers allows as they are with the
+    slip, and not as they were printed: by a digit too many or missing.
+    """
+    while True:
+        values = np.round(rng.uniform(20, 60, 4), 2)
+        entries, k = [f"{value:.2f}" for value in values], int(rng.integers(4))
+        average = f"{values.mean():.{int(rng.integers(2, 4))}f}"
+        entries[k] = _slipped(rng, entries[k], "one digit wrong")
+        gaps = _gaps(entries, average)
+        as_tried = _suspected(gaps, 0)
+        if as_tried != _suspected(gaps, 0, kept=True) and _suspected(gaps, -1e-7) == _suspected(gaps, 1e-7) == as_tried:
+            return entries, average
+
+
 def of_another_sign(rng):
     """A column, of negative numbers or of positive ones, whose average has the sign of the others."""
     sign, values = rng.choice([-1, 1]), np.round(rng.uniform(20, 60, 4), 1)
@@ -915,16 +930,23 @@ SUSPECTS = Exercise(
     draw=COLUMNS,
     metric=metrics.Exactly(),
     noisy=[
-        (functools.partial(_clear, draw=draw), metrics.Exactly(), words)
-        for draw, words in (
-            (printed_twice, "right for entries that all differ, but not where two of them are printed alike:"),
-            (of_another_sign, "right, but not where mean and average differ by their sign:"),
-            (of_two_slips, "right where a slip explains it, but not where none does, so that nobody is named:"),
-            (
-                functools.partial(other_columns, kind="many"),
-                "right for four or five entries, but not for fewer or more:",
-            ),
-        )
+        (
+            of_other_digits,
+            metrics.Exactly(),
+            "right, but not where the number with the slip has more digits, or fewer:",
+        ),
+        *(
+            (functools.partial(_clear, draw=draw), metrics.Exactly(), words)
+            for draw, words in (
+                (printed_twice, "right for entries that all differ, but not where two of them are printed alike:"),
+                (of_another_sign, "right, but not where mean and average differ by their sign:"),
+                (of_two_slips, "right where a slip explains it, but not where none does, so that nobody is named:"),
+                (
+                    functools.partial(other_columns, kind="many"),
+                    "right for four or five entries, but not for fewer or more:",
+                ),
+            )
+        ),
     ],
     hints=(
         "First: do entries and average agree as printed? Only if not, who could have slipped?",
@@ -960,6 +982,11 @@ SUSPECTS = Exercise(
         Mistake(
             lambda entries, average: found if len(found := suspects(entries, average)) == 1 else set(),
             "You accuse nobody where several could have slipped. Wanted are all of them.",
+        ),
+        Mistake(
+            lambda entries, average: _suspected(_gaps(entries, average), 1e-9, kept=True),
+            "You judge each slip by the half units of the numbers as they were printed. Try it as if it had been "
+            "printed, with the half unit of its own digits.",
         ),
         Mistake(
             lambda entries, average: {(k + 1) % (len(entries) + 1) for k in suspects(entries, average)},

@@ -36,6 +36,13 @@ def rows_of_a_cell(rng, n=None, still=False, reach=400.0):
     return T_BF, invert(T_BF @ X) @ Y
 
 
+def rows_that_contradict(rng):
+    """The same with readings that err by a degree and a few millimeters."""
+    T_BF, T_ST = rows_of_a_cell(rng)
+    n = len(T_ST)
+    return T_BF, T_ST @ pose(exp_so3(rng.normal(0.0, 0.02, (n, 3))), rng.normal(0.0, 3.0, (n, 3)))
+
+
 def some_motions(rng, apart, turns=(0.2, 2.0), n=None):
     """n motions, or some, that turn by such angles (rad) about axes in all directions, and how far apart they are compared.
 
@@ -518,12 +525,13 @@ CHAPTER = Chapter(
         Exercise(
             "motions",
             reference=motion.motions,
-            sizes=("T_BF", "T_ST"),
+            sizes=("T_BF T_ST",),
             draw=rows_of_a_cell,
             metric=MOTIONS,
             noisy=[
                 (functools.partial(rows_of_a_cell, n=2), MOTIONS, "right for many rows, but not for two of them, which make one motion:"),
                 (functools.partial(rows_of_a_cell, n=40, reach=20000.0), MOTIONS, "right for few rows, but not for forty of them, meters apart:"),
+                (rows_that_contradict, MOTIONS, "right, but not where the sensor's readings err, as all do:"),
                 (functools.partial(rows_of_a_cell, still=True), MOTIONS, "right where the robot always moves, but not where it stays, and a motion is the identity:"),
             ],
             hints=(
@@ -927,7 +935,7 @@ CHAPTER = Chapter(
                 Mistake(lambda C, c: next_pose(C, c) + 1, "Candidates count from 0."),
                 Mistake(lambda C, c: c[next_pose(C, c)], "This is the candidate's derivative. Asked for is its number."),
                 Mistake(lambda C, c: float(_volumes(C, c).min()), "This is the determinant it leaves. Asked for is the candidate's number."),
-                Mistake(_one_after_the_other, "You return the last one, whatever it brings. In a loop it comes out where C keeps what the candidates before it brought, or where the smallest determinant so far is not kept.", id="next_pose-64863e"),
+                Mistake(_one_after_the_other, "You return the last one. In a loop this happens where C keeps what the candidates before it brought, or where the smallest determinant so far is not kept.", id="next_pose-64863e"),
                 Mistake(_alone, "You looked at each candidate alone: what is known already, C, makes some of them worth little."),
                 Mistake(lambda C, c: 0, "You return the first one, whatever it brings."),
             ],
