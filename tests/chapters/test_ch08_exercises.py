@@ -491,7 +491,7 @@ def in_degrees_and_half_of_what_is_large(x0, cov0, z, C, cov_z):
         (
             "fuse_two_sensors",
             inflated_by_the_readings,
-            "with 1 in its place, your result is right",
+            "with 1 on the right side, your result is right",
         ),
         ("gate", the_nis_itself, "`nis` stands where `True` belongs"),
         (
