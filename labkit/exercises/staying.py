@@ -14,7 +14,7 @@ from .results import Refusal, admitted_by, is_another, numbers_of, same_numbers
 REPEATING = 0.02  # seconds of processor time in which an answer that came out right is called again
 IN_A_ROW = 8  # times that a draw is called then, of each of ...
 TURNS = 6  # of draws in which each argument is exchanged: of one the result may hang little, or not at all
-PARTS = 2  # of these, in which only its second half is
+PARTS = 2  # of these, in which only a part of it is
 ALIKE = 3  # kinds of results at most, where they are words or truth values
 UNFILLED = {"empty", "empty_like"}  # what makes arrays that hold whatever stood there before
 
@@ -127,7 +127,8 @@ class Staying(Evidence):
             args, other = (exercise.cases[(turn + k + more) % len(exercise.cases)](rng) for more in (0, turn % 2))
             if not kind.left() or k >= min(len(args), len(other)) or type(args[k]) is not type(other[k]):
                 continue
-            before = other[k] if turn < TURNS - PARTS else begun_alike(args[k], other[k])
+            parts = turn - TURNS + PARTS
+            before = other[k] if parts < 0 else partly_alike(args[k], other[k], parts)
             expected = exercise.reference(*copy.deepcopy(args))
             admitted = functools.partial(admitted_by, exercise.metric, expected)
             before = guard.run(self.function, (*args[:k], before, *args[k + 1 :]), admitted, exercise.limit)
@@ -145,11 +146,17 @@ class Staying(Evidence):
         return None
 
 
-def begun_alike(value, other):
-    """Another value of an argument that begins as this one, be it bytes or an array: its second half is the other's."""
+def partly_alike(value, other, part):
+    """Another value of an argument that is this one in a part: bytes or arrays in their first half (part 0) or second
+    (part 1), poses (..., 4, 4) in their rotation (0) or translation (1).
+    """
     if isinstance(value, bytes):
-        return value[: len(value) // 2] + other[len(value) // 2 :]
+        half = len(value) // 2
+        return other[:half] + value[half:] if part else value[:half] + other[half:]
     if not isinstance(value, np.ndarray) or np.shape(value) != np.shape(other) or value.size < 2:
         return other
-    half = np.arange(value.size).reshape(value.shape) < value.size // 2
-    return np.where(half, value, other)
+    if value.shape[-2:] == (4, 4):
+        kept = np.arange(4) < 3
+    else:
+        kept = np.arange(value.size).reshape(value.shape) < value.size // 2
+    return np.where(kept == (part == 0), value, other)

@@ -80,8 +80,14 @@ class Check:
         feedback.show = cls.shown.append
 
 
-def judge(shell, answer, seed, pipe):
-    """Type an answer into the running notebook and send (status, text); in a process that ends with it."""
+def judge(shell, cell, answer, seed, pipe):
+    """Type an answer into the running notebook and send (status, text); in a process that ends with it.
+
+    What the cell gives before a value that is asked for runs before.
+    """
+    given, blank, _ = cell.partition(f"{answer.exercise} = ...")
+    if blank:
+        shell.run_cell(given)
     Check.seed = seed
     Check.shown.clear()
     result = shell.run_cell(answer.code)
@@ -93,11 +99,11 @@ def judge(shell, answer, seed, pipe):
         pipe.send((NO_VERDICT, repr(error) if error else "the cell checks nothing"))
 
 
-def in_a_copy(shell, answer, seed):
+def in_a_copy(shell, cell, answer, seed):
     """What `judge` sends from a copy of this process; one that hangs is ended."""
     copies = multiprocessing.get_context("fork")
     here, there = copies.Pipe(duplex=False)
-    copy = copies.Process(target=judge, args=(shell, answer, seed, there))
+    copy = copies.Process(target=judge, args=(shell, cell, answer, seed, there))
     copy.start()
     there.close()
     try:
@@ -124,7 +130,7 @@ def chapter(folder, number, seeds, only):
             here = asked(cell, exercises)
             for answer in answers if here else ():
                 if answer.exercise == here:
-                    told[answer.number] = [in_a_copy(shell, answer, seed) for seed in seeds]
+                    told[answer.number] = [in_a_copy(shell, cell, answer, seed) for seed in seeds]
             shell.run_cell(cell)
         sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__
     missing = (NO_VERDICT, "the notebook has no cell for it")
