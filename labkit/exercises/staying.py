@@ -13,7 +13,7 @@ from .results import Refusal, admitted_by, is_another, numbers_of, same_numbers
 
 REPEATING = 0.02  # seconds of processor time in which an answer that came out right is called again
 IN_A_ROW = 8  # times that a draw is called then, of each of ...
-TURNS = 6  # of draws in which each argument is exchanged: of one the result may hang little, or not at all
+TURNS = 10  # of draws in which each argument is exchanged: of one the result may hang little, or not at all
 PARTS = 2  # of these, in which only a part of it is
 ALIKE = 3  # kinds of results at most, where they are words or truth values
 UNFILLED = {"empty", "empty_like"}  # what makes arrays that hold whatever stood there before
