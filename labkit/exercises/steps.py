@@ -284,12 +284,11 @@ class Search:
             return None
         told = self._left_out_instead(plan[1])
         _, line, code, mends = changes[told]
-        mends = (
-            self._of_truth(mends) + self._if_at_all(told) + (mutation.what_stays(code) if mends in UNBOUNDED else "")
-        )
+        stays = mutation.what_stays(code) if mends in UNBOUNDED else ""
+        mends = self._of_truth(mends) + self._if_at_all(told)
         words = self._whatever_words(line, code, mends) or self._weight_words(line, code, mends)
         words = words or self._settled_words(line, mends)
-        return words or f"in line {line}, `{code}`: {mends}. {self._alone()}"
+        return words or f"in line {line}, `{code}`: {mends}{stays}. {self._alone()}"
 
     def _of_truth(self, mends):
         """The words of a change to 0 or 1 where True or False is asked for."""
