@@ -168,7 +168,8 @@ ex.predict("velocity", guess, reveal=stages.vehicle)
 def steady_state_gain(A, C, cov_v, cov_z):
     """Return the gain K, shape (n, m), after very many steps, right to 0.001.
 
-    A (n, n), C (m, n), cov_v (n, n) of the system per step, cov_z (m, m).
+    A (n, n), C (m, n), cov_v (n, n) of the system per step, cov_z (m, m). The sensor
+    sees every state, directly or through A.
     """
     ### BEGIN SOLUTION
     cov = np.eye(len(A))

@@ -260,7 +260,8 @@ ex.predict("more", guess, reveal=stages.next_pose)
 def next_pose(C, candidates):
     """Return the number, from 0, of the candidate that leaves the smallest determinant.
 
-    C (p, p): covariance so far; candidates (m, k, p): whitened derivatives of m.
+    C (p, p): covariance so far, p at most 12; candidates (m, k, p): whitened
+    derivatives of m.
     """
     ### BEGIN SOLUTION
     return int(np.argmin([np.linalg.det(with_one_more(C, J)) for J in candidates]))

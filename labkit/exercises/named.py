@@ -3,6 +3,7 @@
 import copy
 import functools
 import re
+from dataclasses import replace
 
 import numpy as np
 
@@ -133,6 +134,8 @@ class Named(Evidence):
 
     def _is_mistake(self, mistake, args, metric, pair):
         metric = metric or metrics.Numbers(1e-12)
+        if mistake.within and isinstance(metric, metrics.Numbers):
+            metric = replace(metric, tol=mistake.within)
         try:
             with np.errstate(all="ignore"), guard.only_finite_matrices():
                 wrong = mistake.variant(*copy.deepcopy(args))

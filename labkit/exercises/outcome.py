@@ -31,8 +31,9 @@ class Mistake:
     """A wrong variant of the reference, with the same arguments, and what to tell who made it.
 
     `id` is the same in every term and in every list, so that two classes can be compared. Left out, it follows from
-    the exercise and the sentence; whoever only improves the sentence writes the old id down. `within` is for a Value
-    that comes from a search: how far, in the Value's unit, an answer may be from the wrong one and still be it.
+    the exercise and the sentence; whoever only improves the sentence writes the old id down. `within` is for what
+    comes from a search or from differences: how far an answer may be from the wrong one and still be it, in the unit
+    of a Value, or in place of the tolerance of an exercise's Numbers.
     """
 
     variant: object

@@ -49,7 +49,8 @@ class Trial(Raised, Staying):
             names = ", ".join(f"`{name}`" for k, name in enumerate(self._names(args)) if k in run.changed)
             advice = INTO_SECOND if "arctan" in scope.co_names(self.function) else ""
             return self.outcome(
-                NOT_YET, f"your function changes its argument {names} in place: work on a copy.{advice}"
+                NOT_YET,
+                f"your function changes its argument {names} in place: leave it as it came, and change copies.{advice}",
             )
         self.inputs.append(args)
         self.pairs.append((admitted[0], expected))

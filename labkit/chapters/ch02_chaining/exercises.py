@@ -441,6 +441,14 @@ def _turn_of_loop():
 
 
 @functools.cache
+def _shift_across_the_axis():
+    """The part (mm) of the loop's shift that is perpendicular to the axis of its turn."""
+    T = _sheet()
+    twice_sine = T[:3, :3] - T[:3, :3].T
+    axis = np.array([twice_sine[2, 1], twice_sine[0, 2], twice_sine[1, 0]])
+    return np.linalg.norm(np.cross(axis / np.linalg.norm(axis), T[:3, 3]))
+
+
 def _worst_at_one_meter():
     """Largest displacement of a point 1000 mm from the origin of K0, over directions 1.3 deg apart (mm)."""
     k = np.arange(20_000) + 0.5
@@ -911,6 +919,16 @@ CHAPTER = Chapter(
                     lambda angle, distance: np.hypot(1000 * angle, distance),
                     "This takes what the turn does and what the shift does to be perpendicular. In the worst direction nearly all of the shift adds to the turn.",
                     "meter-hypot",
+                ),
+                *_of_either_angle(
+                    lambda angle, distance: 1000 * angle + _shift_across_the_axis(),
+                    "This leaves out how far the closure motion slides along its axis, perpendicular to the rest.",
+                    "meter-no-slide",
+                ),
+                *_of_either_angle(
+                    lambda angle, distance: 2000 * np.sin(angle / 2) + _shift_across_the_axis(),
+                    "This leaves out how far the closure motion slides along its axis, perpendicular to the rest.",
+                    "meter-no-slide-chord",
                 ),
                 Mistake(
                     lambda: chaining.closure_error(_sheet())[1],

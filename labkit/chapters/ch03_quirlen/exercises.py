@@ -622,6 +622,22 @@ CHAPTER = Chapter(
                     )
                     for k in (0, -1)
                 ),
+                *(
+                    Mistake(
+                        lambda pick=pick: pick(
+                            np.linalg.norm(lab_sheet.kreisel_poses()[:, :3, 3] - _kreisel().pivot, axis=1)
+                        ),
+                        f"This is the {word} distance from a flange to the pivot. It is near: the tip misses the pivot a little in every "
+                        "pose. The length of the tool itself is that of the tip, x[:3].",
+                        id=f"tip-{word}-distance",
+                    )
+                    for word, pick in (
+                        ("largest", np.max),
+                        ("smallest", np.min),
+                        ("mean", np.mean),
+                        ("middle", np.median),
+                    )
+                ),
                 Mistake(
                     lambda: np.linalg.norm(lab_sheet.kreisel_poses()[:, :3, 3].mean(axis=0) - _kreisel().pivot),
                     "This is how far the pivot is from the mean of all flanges, which lies nearer than each of them. The length of the "

@@ -1062,6 +1062,20 @@ CHAPTER = Chapter(
                     "The part of the well at (−1, −2) is half of what it should be: w = 200 there, and every factor is the same as at (1, 1).",
                     id="hessian-one-depth",
                 ),
+                *(
+                    Mistake(
+                        _hessian(factor=np.where(np.arange(2) == k, factor, 8.0)),
+                        f"The outer product of the well at {center} {word}: −(8w/q³)(x − c)(x − c)ᵀ with w = {depth} there.",
+                        id=f"hessian-outer-{k}-{name}",
+                    )
+                    for k, (center, depth) in enumerate((("(1, 1)", 100), ("(−1, −2)", 200)))
+                    for factor, name, word in (
+                        (4.0, "half", "is half of what it should be"),
+                        (16.0, "twice", "is twice what it should be"),
+                        (0.0, "missing", "is missing"),
+                        (-8.0, "sign", "has the wrong sign"),
+                    )
+                ),
                 Mistake(
                     _hessian(power=4),
                     "Your outer product is divided by q⁴: the derivative of 1/q² has q³ below, times that of q.",

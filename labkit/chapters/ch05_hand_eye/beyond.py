@@ -274,6 +274,13 @@ def length_with(*args, **kwargs):
     return float(np.linalg.norm(marks_with(*args, **kwargs)))
 
 
+def cad_offset():
+    """How far the CAD pose is off the calibrated one, mm."""
+    measured = thesis.measurements(True)
+    truth = hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S).T_FS
+    return float(np.linalg.norm(truth[:3, 3] - thesis.frame("scanner_start")[:3, 3]))
+
+
 def place_error():
     """How far a mark comes out from its true place with the CAD pose, mm: both by as much."""
     measured = thesis.measurements(True)
@@ -654,6 +661,16 @@ CAD_LENGTH = Value(
             lambda: length_with("scanner_start", change=lambda T: np.eye(4)),
             "This comes out where the scanner's pose is missing, or comes after the robot's, where it changes no length. The marks are seen in its frame: first `cad` takes them to the flange.",
             id="length-no-scanner",
+        ),
+        Mistake(
+            lambda: np.linalg.norm(GAUGE[1] - GAUGE[0]) + 2 * cad_offset(),
+            "Twice the offset of the CAD pose is added to the true length, as if all of it were along the gauge. Compute where both marks land.",
+            id="length-twice-offset",
+        ),
+        Mistake(
+            lambda: np.linalg.norm(GAUGE[1] - GAUGE[0]) + cad_offset(),
+            "The offset of the CAD pose is added to the true length, as if it were along the gauge. Compute where both marks land.",
+            id="length-offset",
         ),
         Mistake(
             lambda: 164.0,

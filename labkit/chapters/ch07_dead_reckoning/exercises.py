@@ -918,6 +918,11 @@ CHAPTER = Chapter(
                     "Square first, then subtract: (a - b)^2 is not a^2 - b^2.",
                 ),
                 Mistake(
+                    lambda L, d, p: (np.linalg.norm(L - p, axis=1) - d) * np.abs(np.linalg.norm(L - p, axis=1) - d),
+                    "Square first, then subtract: (a - b)^2, with the sign of a - b, is not a^2 - b^2.",
+                    id="lateration-signed-square",
+                ),
+                Mistake(
                     lambda L, d, p: (L - p).sum(1) ** 2 - d**2,
                     "Square dx and dy one by one, then add: (dx + dy)^2 is not dx^2 + dy^2.",
                 ),

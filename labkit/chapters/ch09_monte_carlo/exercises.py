@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtri, logsumexp, ndtr, ndtri
+from scipy.special import chdtri, i0e, logsumexp, ndtr, ndtri
 
 from ...documents.lecture.examples import load_building
 from ...exercises import metrics
@@ -919,6 +919,10 @@ def _landmarks(
             error = std_bearing * planar.wrap_angle((z[:, 1] - bearing + pose[2]) / std_bearing)
         elif wrap == "degrees":
             error = np.rad2deg(planar.wrap_angle(z[:, 1] - bearing + pose[2]))
+        elif wrap == "sine":
+            error = np.sin(z[:, 1] - bearing + pose[2])
+        elif wrap == "chord":
+            error = 2 * np.sin((z[:, 1] - bearing + pose[2]) / 2)
         else:
             error = z[:, 1] - bearing + turn * pose[2]
             error = planar.wrap_angle(error) if wrap else error
@@ -960,6 +964,13 @@ def _bearings_folded(pose, z, landmarks, std_range, std_bearing):
     bearings = np.arctan2(*(landmarks - pose[:2]).T[::-1]) - pose[2]
     folded = np.column_stack([z[:, 0], bearings + np.arcsin(np.sin(z[:, 1] - bearings))])
     return landmark_weight(pose, folded, landmarks, std_range, std_bearing)
+
+
+def _bearings_by_von_mises(pose, z, landmarks, std_range, std_bearing):
+    dx, dy = (landmarks - pose[:2]).T
+    ranges = _normal_log(z[:, 0] - np.hypot(dx, dy), std_range)
+    error, kappa = z[:, 1] - np.arctan2(dy, dx) + pose[2], 1 / std_bearing**2
+    return float((ranges + kappa * (np.cos(error) - 1) - np.log(2 * math.pi * i0e(kappa))).sum())
 
 
 def _landmarks_that_fit_best(pose, z, landmarks, std_range, std_bearing):
@@ -2429,6 +2440,20 @@ CHAPTER = Chapter(
                 Mistake(
                     _bearings_folded,
                     "Your bearing errors are folded at 90 deg, as np.arcsin folds: 170 deg counts as 10 deg. planar.wrap_angle keeps them.",
+                ),
+                Mistake(
+                    _landmarks(wrap="sine"),
+                    "You take the sine of the bearing error for the error: 170 deg counts as 10 deg. planar.wrap_angle keeps it an angle.",
+                    id="landmark-sine",
+                ),
+                *(
+                    Mistake(
+                        variant,
+                        "Your bearing's density is not the normal one: the cosine of the error, as in von Mises' density, is not its square. Near "
+                        "0 both are alike. Wrap the difference, divide by std_bearing, square.",
+                        id=f"landmark-{name}",
+                    )
+                    for name, variant in (("chord", _landmarks(wrap="chord")), ("von-mises", _bearings_by_von_mises))
                 ),
                 Mistake(
                     _landmarks(wrap="quotient"),

@@ -341,6 +341,7 @@ BOUND = Exercise(
                 "That is the slope times the half unit. Where f is curved the move itself is another: go the half "
                 "unit up and down.",
                 id=f"bound-1fcd90{which}",
+                within=1e-5,  # slopes of one's own
             )
             for step, which in ((1e-6, ""), (1e-5, "-2"), (1e-4, "-3"), (1e-7, "-4"), (1e-8, "-5"))
         ),
