@@ -245,6 +245,7 @@ class Written:
         self.places = [(int(n), str(code), str(name), int(size), int(k)) for n, code, name, size, k in places]
         self.lines = {int(n): str(line) for n, line in facts["lines"].items()}
         self.of_notebook = set(map(str, facts["of_notebook"]))
+        self.left_alone = list(map(str, facts["left_alone"]))
         self.iterated, self.searched = (set(map(int, facts[n])) for n in ("iterated", "searched"))
 
     def trace(self, args, seconds):

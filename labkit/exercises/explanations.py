@@ -345,7 +345,7 @@ class Explanations(Named):
             else ": what is different about the others?"
         )
         named = None if special or near else self._named_elsewhere()
-        asked = f". What it gives on the others: {named}" if named else asked
+        asked = f". Where it is wrong: {named}" if named else asked
         right = special or f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws{asked}"
         return f"{told} {right}{example}"
 

@@ -34,7 +34,9 @@ class RefusedBeside(Refused):
 
 @dataclass(frozen=True)
 class Deviation:
-    """How far one aspect of a result is off; with `several`, the entry is the worst of those that are."""
+    """How far one aspect of a result is off; with `several`, the entry is the worst of those that are, else the one at
+    `place`.
+    """
 
     what: str
     amount: float
@@ -42,6 +44,7 @@ class Deviation:
     tolerance: float
     words: str = ""
     several: bool = False
+    place: tuple = ()
 
     @property
     def within(self):
@@ -50,7 +53,8 @@ class Deviation:
     def __str__(self):
         if self.words:
             return f"{self.what}: {self.words}" if self.what else self.words
-        entry = self.what.replace("one entry", "the worst entry") if self.several else self.what
+        alone = f"entry {list(self.place)} (counted from 0)" if self.place else "one entry"
+        entry = self.what.replace("one entry", "the worst entry" if self.several else alone)
         what = f"{entry} is off" if entry else "it is off"
         return f"{what} by {self.amount:.3g}{' ' + self.unit if self.unit else ''}"
 
@@ -237,7 +241,8 @@ class Numbers(Metric):
         scale = 1.0 if self.absolute else max(self.least, np.abs(expected).max(initial=0.0))
         off, tol = np.abs(result.astype(float) - expected), self.tol * scale
         what, amount = "one entry" if result.ndim else "", float(off.max(initial=0.0))
-        return [Deviation(what, amount, self.unit, tol, several=bool((off > tol).sum() > 1))]
+        place = tuple(map(int, np.unravel_index(off.argmax(), off.shape))) if off.size else ()
+        return [Deviation(what, amount, self.unit, tol, several=bool((off > tol).sum() > 1), place=place)]
 
 
 @dataclass(frozen=True)
@@ -310,16 +315,11 @@ class Rotations(Metric):
         R = result.astype(float)
         skewness = float(np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(initial=0.0))
         allowed = min(np.deg2rad(self.deg), ORTHONORMAL)
-        if skewness > 1e-3 or (np.linalg.det(R) < 0).any() or not _are_rotations(expected):
+        mirrored = bool((np.linalg.det(R) < 0).any())
+        if skewness > 1e-3 or mirrored or not _are_rotations(expected):
             entry = float(np.abs(R - expected).max(initial=0.0))
-            return [
-                Deviation(
-                    "the rotation",
-                    entry,
-                    "in its worst entry",
-                    allowed,
-                )
-            ]
+            reflection = ": it is a reflection, its determinant is -1" if mirrored and skewness <= 1e-3 else ""
+            return [Deviation("the rotation", entry, f"in its worst entry{reflection}", allowed)]
         angle = float(np.rad2deg(np.max(frames.rotation_angle(np.swapaxes(R, -1, -2) @ expected), initial=0.0)))
         return [
             Deviation("the rotation", angle, "deg", self.deg),

@@ -87,6 +87,7 @@ COMMUTE = {ast.Add, ast.Mult, ast.MatMult}  # where either side can be left out 
 
 REDUCTIONS = {"sum", "mean", "median", "std", "var", "prod", "max", "min", "norm", "argmax", "argmin", "any", "all"}
 COARSE, FINE = 1e-6, 1e-6  # from which on a bound or a step of differences may be too large, and what part of it is not
+LESS = {FINE: "millionth", 1e-3: "thousandth"}  # of a step: where the one is too small, as rounding is divided by it
 FINER = -1  # the rank of what is made finer: few changes, tried by themselves, before others make loops without an end
 TINY, LONGER, MILD = 1e-6, (1e3, 1e6), 1e-5  # up to which a step of differences may be too short, how many times as
 # long is not, and how long at most
@@ -277,6 +278,16 @@ def _repeated(function):
                 yield Change("", mends, 0, node, put(new))
 
 
+def _counted_from_nought(function):
+    """A last entry less the first one: what is asked is how far the one is from the other, and the first need not be 0."""
+    for node, put in _parts(function):
+        index = node.slice if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) else None
+        if index is not None and ast.unparse(index) == "-1" and isinstance(node.ctx, ast.Load):
+            first = ast.Subscript(node.value, ast.Constant(0), ast.Load())
+            mends = f"`{ast.unparse(first)}` is to be taken off, as that need not be 0"
+            yield Change("", mends, 1, node, put(ast.BinOp(node, ast.Sub(), first)))
+
+
 def _of_diagonals(function):
     """Sums of rows or columns where the diagonal is meant, and a matrix with all but its diagonal set to 0."""
     for node, put in _parts(function):
@@ -362,7 +373,8 @@ def _everywhere(found):
         if likely and change.mends and isinstance(change.place, ast.expr):
             alike.setdefault((change.words, _form(change.place), _form(_put(change))), []).append(change)
             if isinstance(change.place, ast.Call) and re.fullmatch(r"without `\w+`", change.words):
-                alike.setdefault((change.words, ast.unparse(change.place.func), ""), []).append(change)
+                kept = change.place.args.index(_put(change)) if _put(change) in change.place.args else None
+                alike.setdefault((change.words, ast.unparse(change.place.func), kept), []).append(change)
     for group in alike.values():
         sets = _together(group)
         if sets is None or any(_holds(a.place, b.place) for a in group for b in group):
@@ -425,7 +437,7 @@ def mending(function):
     """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer,
     gone on with or begun at 0, an axis, an outer product, an index that a loop should count, an argument or a size that
     is typed in, a pi of three digits, the sign that a root has lost, a diagonal that is meant or is not, a share that a
-    comparison allows, a list that is repeated, what rounding brings beyond what a function takes, and one slip mended
+    comparison allows, a list that is repeated, a first entry that is not taken off the last one, what rounding brings beyond what a function takes, and one slip mended
     wherever it stands: who copies a line copies its slip.
     """
     found = changes(function)
@@ -452,6 +464,7 @@ def mending(function):
     found += _sizes(function)
     found += _of_no_share(function)
     found += _repeated(function)
+    found += _counted_from_nought(function)
     found += _kept_within(function)
     meant = {*_digits_left(function), *_not_repeated(function), *_typed_starts(function)}
     return sorted((change for change in found if change.place not in meant), key=lambda change: change.rank)
@@ -595,15 +608,13 @@ def _called(call):
     return getattr(call.func, "attr", getattr(call.func, "id", ""))
 
 
-def what_stays(code):
-    """What stands alone in a line that loses its only bound, where the bound is a number, as the end of a sentence."""
-    try:
-        nodes = list(ast.walk(ast.parse(code)))
-    except SyntaxError:  # a line that is cut
+def left_alone(change):
+    """The part that a change leaves of a call with several arguments, as it is typed; "" for any other change."""
+    call = change.place
+    if len(change.sets) > 1 or not isinstance(call, ast.Call) or not re.fullmatch(r"without `\w+`", change.words):
         return ""
-    bounds = [node for node in nodes if isinstance(node, ast.Call) and _called(node) in BOUNDED | BOUNDS]
-    kept = [part for call in bounds for part in call.args if _number(part) is None]
-    return f", so that `{ast.unparse(kept[0])}` stands alone" if len(bounds) == len(kept) == 1 else ""
+    several = len(call.args) + len(call.keywords) + (_put(change) not in call.args) > 1
+    return ast.unparse(_put(change)) if several else ""
 
 
 def _limits(call):
@@ -634,14 +645,15 @@ def _finer(function):
         if isinstance(owner, ast.Compare) and len(owner.ops) == 1:
             number = owner.comparators[0]
             if _is_coarse(number) and isinstance(owner.ops[0], ast.Lt | ast.LtE | ast.Gt | ast.GtE):
-                yield _with_a_millionth(FINER, owner, ((owner, "comparators", [ast.Constant(FINE * number.value)]),))
+                yield _with_a_part_of_it(FINER, owner, "comparators")
         elif isinstance(owner, ast.BinOp) and isinstance(owner.op, ast.Add):
             for side in ("left", "right"):
                 number = getattr(owner, side)
                 if _is_coarse(number, ADDED):
-                    yield _with_a_millionth(FINER, owner, ((owner, side, ast.Constant(FINE * number.value)),))
+                    yield _with_a_part_of_it(FINER, owner, side)
         elif isinstance(owner, ast.Assign) and _is_coarse(owner.value):
-            yield _with_a_millionth(2, owner, ((owner, "value", ast.Constant(FINE * owner.value.value)),))
+            for part in LESS:
+                yield _with_a_part_of_it(2, owner, "value", part)
         elif isinstance(owner, ast.For) and getattr(getattr(owner.iter, "func", None), "id", "") == "range":
             given = owner.iter.args
             if len(given) == 1 and isinstance(given[0], ast.Constant) and type(given[0].value) is int:
@@ -711,16 +723,20 @@ def _finer_differences(function):
     for step in sorted({node.value for *_, node in coarse}):
         alike = [found for found in coarse if found[-1].value in (step, 2 * step)]
         quotients = [owner for owner, field, *_ in alike if field == "right" and isinstance(owner.op, ast.Div)]
-        if not quotients:
-            continue
-        group = []
-        for owner, field, content, i, node in alike:
-            new = ast.copy_location(ast.Constant(FINE * node.value), node)
-            whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
-            group.append(Change("", "", FINER, owner, ((owner, field, whole),)))
-        if sets := _together(group):
-            mends = f"`{step}` is far too long a step for differences: a millionth of it will do, wherever it stands"
-            yield Change("", mends, FINER, quotients[0], sets)
+        for part, word in LESS.items() if quotients else ():
+            if sets := _together(_all_turned_into(lambda step, part=part: part * step, alike)):
+                mends = f"`{step}` is far too long a step for differences: a {word} of it will do, wherever it stands"
+                yield Change("", mends, FINER, quotients[0], sets)
+
+
+def _all_turned_into(other, alike):
+    """The changes of numbers that are typed in, wherever they stand, into `other` of them."""
+    group = []
+    for owner, field, content, i, node in alike:
+        new = ast.copy_location(ast.Constant(other(node.value)), node)
+        whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
+        group.append(Change("", "", FINER, node, ((owner, field, whole),)))
+    return group
 
 
 def _longer_steps(function):
@@ -733,11 +749,7 @@ def _longer_steps(function):
         longer = float(f"{times * number:g}")
         if times > LONGER[0] and longer > MILD or not _is_step(function, {node for *_, node in alike}):
             continue
-        group = []
-        for owner, field, content, i, node in alike:
-            new = ast.copy_location(ast.Constant(longer), node)
-            whole = [*content[:i], new, *content[i + 1 :]] if isinstance(content, list) else new
-            group.append(Change("", "", FINER, node, ((owner, field, whole),)))
+        group = _all_turned_into(lambda _, longer=longer: longer, alike)
         if sets := group[0].sets if len(group) == 1 else _together(group):
             mends = f"rounding shows where a step is as short as this: {longer:g} will do"
             yield Change("", mends, FINER, group[0].place, sets)
@@ -889,13 +901,13 @@ def _is_coarse(node, most=1.0):
     return isinstance(node, ast.Constant) and type(node.value) is float and COARSE <= node.value <= most
 
 
-def _with_a_millionth(rank, place, sets):
-    owner, field, _ = sets[0]
-    number = owner.comparators[0] if field == "comparators" else getattr(owner, field)
-    mends = f"`{ast.unparse(number)}` is far too large: a millionth of it will do"
-    for _, _, new in sets:
-        _locate(new[0] if isinstance(new, list) else new, number)
-    return Change("", mends, rank, place, sets)
+def _with_a_part_of_it(rank, place, field, part=FINE):
+    """A number that is typed in made far smaller."""
+    content = getattr(place, field)
+    number = content[0] if isinstance(content, list) else content
+    new = ast.copy_location(ast.Constant(part * number.value), number)
+    mends = f"`{ast.unparse(number)}` is far too large: a {LESS[part]} of it will do"
+    return Change("", mends, rank, place, ((place, field, [new] if isinstance(content, list) else new),))
 
 
 def _parts(function):
@@ -1130,6 +1142,8 @@ def _call(node, names):
         yield 0, "with `arctan` of a quotient where `arctan2` belongs", quotient
     if inner is not None and not (isinstance(inner, ast.Name) and inner.id in ("np", "rng")):
         yield 1, f"without `{name}`", inner
+        if name in BOUNDS and len(node.args) == 2 and inner is node.args[0] and _number(node.args[1]) is None:
+            yield 1, f"without `{name}`", node.args[1]
     yield from _other_arguments(node, name)
     yield 2, "with one sign turned", ast.UnaryOp(ast.USub(), node)
     yield 3, "with one part squared", ast.BinOp(node, ast.Pow(), ast.Constant(2))

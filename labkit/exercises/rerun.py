@@ -166,7 +166,7 @@ class Written:
     of_truth: numbers of the places where a truth value, or an array of them, was met in a trace.
     """
 
-    FACTS = ("lines", "of_notebook", "iterated", "searched")
+    FACTS = ("lines", "of_notebook", "iterated", "searched", "left_alone")
 
     def __init__(self, function, tree, lines=None, beside=()):
         self.function, self.beside, self.lines = function, [helper for helper, _ in beside], lines or {}
@@ -195,6 +195,11 @@ class Written:
     def searched(self):
         """Lines in which stands where a search begins."""
         return {line for tree in self.trees for line in _searched(tree)}
+
+    @functools.cached_property
+    def left_alone(self):
+        """What each change leaves of a call with several arguments that it takes away, by its number; else ""."""
+        return [mutation.left_alone(change) for change in self._changes]
 
     @functools.cached_property
     def _changes(self):

@@ -16,6 +16,7 @@ import numpy as np
 
 from . import metrics, mutation, operands, relations, rerun, slips
 from .arguments import is_numeric
+from .wording import joined
 
 WORTH = 3  # how unlikely a change of the code may be that is tried before changes of values
 CLOSE = 1e-7  # how far, relatively, two values may lie apart that are the same
@@ -284,7 +285,8 @@ class Search:
             return None
         told = self._left_out_instead(plan[1])
         _, line, code, mends = changes[told]
-        stays = mutation.what_stays(code) if mends in UNBOUNDED else ""
+        alone = self.written.left_alone[told]
+        stays = f", so that `{alone}` stands alone" if 0 < len(alone) <= rerun.LENGTH else ""
         mends = self._of_truth(mends) + self._if_at_all(told)
         words = self._whatever_words(line, code, mends) or self._weight_words(line, code, mends)
         words = words or self._settled_words(line, mends)
@@ -857,15 +859,20 @@ class Search:
         mine = [values[k][1] for values in self.values]
         if all(np.isin(m, (0.0, 1.0)).all() for m in mine):  # a condition
             return False
-        if all(m.shape == (1,) and (m == np.round(m)).all() for m in mine) or not name and _is_listing(code):
-            return False  # a count, or several values that are steps of their own
+        if self._is_count(k) or not name and _is_listing(code):
+            return False  # or several values that are steps of their own
         return any(not _same(mine[0][0], other[0]) for other in mine[1:]) and not self._is_given(k)
 
     def _may_be_wrong(self, k, solution):
         """Whether a value is but read there, by the name it was given in another line, and is none that is right."""
         name = self.written.places[k][1]
         given = name in self.names and self._is_given(k)  # an argument may have been bound anew
-        return name.isidentifier() and not given and not self._is_known(k, solution, False)
+        return name.isidentifier() and not (given or self._is_count(k)) and not self._is_known(k, solution, False)
+
+    def _is_count(self, k):
+        """Whether a value is one whole number on every draw."""
+        mine = [values[k][1] for values in self.values if values[k][0]]
+        return bool(mine) and all(m.shape == (1,) and (m == np.round(m)).all() for m in mine)
 
     def _of_parts(self, k, solution):
         """Whether the parts of a wrong value are right, so that it is what is done with them; or may be wrong."""
@@ -878,14 +885,11 @@ class Search:
         computed = (part for part in parts if right and not self._is_given(part))  # another argument may be meant
         codes = dict.fromkeys(f"`{self.written.places[part][1]}`" for part in computed)
         if not codes:
-            inner = range(self.written.places[k][4], k)
-            return (
-                ", perhaps because of one that goes into it"
-                if any(self._may_be_wrong(p, solution) for p in inner)
-                else ""
-            )
+            doubtful = (p for p in range(self.written.places[k][4], k) if self._may_be_wrong(p, solution))
+            names = [f"`{name}`" for name in dict.fromkeys(self.written.places[p][1] for p in doubtful)]
+            return f", perhaps because of {joined(names, 'or')} in it" if names else ""
         are, them = ("are values", "them") if len(codes) > 1 else ("is a value", "it")
-        return f", though {' and '.join(codes)} in it {are} of the solution as well: look at what is done with {them}"
+        return f", though {joined(codes)} in it {are} of the solution as well: look at what is done with {them}"
 
 
 @_or_nothing

@@ -10,7 +10,7 @@ from .outcome import CORRECT, NOT_YET
 from .raised import Raised
 from .results import Refusal
 from .staying import Staying
-from .wording import closed, leading
+from .wording import closed, joined, leading
 
 INTO_SECOND = " `np.arctan(y, x)` writes into x: `np.arctan2` takes two."
 
@@ -46,11 +46,13 @@ class Trial(Raised, Staying):
             endless = isinstance(run.error, RecursionError | MemoryError)  # it would be so again and again
             return told if endless else self._mended(told, args, metric, expected)
         if run.changed:
-            names = ", ".join(f"`{name}`" for k, name in enumerate(self._names(args)) if k in run.changed)
+            changed = [f"`{name}`" for k, name in enumerate(self._names(args)) if k in run.changed]
+            what = f"argument {changed[0]}" if len(changed) == 1 else f"arguments {joined(changed)}"
+            as_it_came = "it as it came" if len(changed) == 1 else "them as they came"
             advice = INTO_SECOND if "arctan" in scope.co_names(self.function) else ""
             return self.outcome(
                 NOT_YET,
-                f"your function changes its argument {names} in place: leave it as it came, and change copies.{advice}",
+                f"your function changes its {what} in place: leave {as_it_came}, and change copies.{advice}",
             )
         self.inputs.append(args)
         self.pairs.append((admitted[0], expected))

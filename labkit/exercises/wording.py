@@ -8,7 +8,7 @@ import numpy as np
 SHOWN = 4  # entries of a set or vector that is shown whole
 WHERE = "as long as|where|for|in|on|near|away|without|to"  # what an answer is said to be right of
 RIGHT_WHERE = re.compile(f"^([Rr]ight)(?=, but not | (?!on ordinary )({WHERE}) )")
-NOISY = "exact on clean data, but noise enters otherwise than it should: on noisy data"
+NOISY = "exact on the clean data tried, but noise enters otherwise than it should: on noisy data"
 
 
 def shown_whole(value):
@@ -45,6 +45,12 @@ def short(value):
         return "<Generator>"
     text = f"{value:.6g}" if isinstance(value, float) else repr(value)
     return text if len(text) <= 60 else f"<{type(value).__name__}>"
+
+
+def joined(words, conjunction="and"):
+    """Words in a row: "a", "a and b", "a, b and c"."""
+    *first, last = words
+    return f"{', '.join(first)} {conjunction} {last}" if first else last
 
 
 def closed(sentence):

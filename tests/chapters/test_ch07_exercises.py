@@ -150,7 +150,7 @@ def on_the_upper_side(landmarks, distances, start):
 
 def test_what_is_right_on_some_draws_is_told_what_the_others_are():
     told = ITEMS["newton_lateration"].judge(on_the_upper_side, rng=np.random.default_rng(0)).text
-    assert "What it gives on the others: This is the mirror image" in told
+    assert "Where it is wrong: This is the mirror image" in told
 
 
 @pytest.mark.parametrize(

@@ -758,7 +758,7 @@ def test_what_was_right_on_typical_data_only_is_refused(name, answer, words, mon
     [
         ("should_resample", lambda w, t: w.min() / w.max() < t, "comes out if"),
         ("should_resample", lambda w, t: w.mean() / w.max() < t, "a right formula"),
-        ("multiply_weights", lambda w, p, k, n: (w * p / (w @ p), k // n == 1), "What it gives on the others"),
+        ("multiply_weights", lambda w, p, k, n: (w * p / (w @ p), k // n == 1), "Where it is wrong"),
     ],
 )
 def test_a_truth_value_that_another_rule_gives_as_well_is_not_said_to_come_of_it(name, answer, words):

@@ -1357,7 +1357,7 @@ def test_right_but_for_one_kind_is_said_of_ordinary_cases_where_another_kind_is_
         ("Right as long as all differ. Where", "Right on ordinary draws as long as all differ. Where"),
         ("right in curves, but not", "right on ordinary draws in curves, but not"),
         ("right on ordinary draws, but not", "right on ordinary draws, but not"),
-        ("exact on clean data, but not", "exact on clean data, but not"),
+        ("exact on the clean data tried, but not", "exact on the clean data tried, but not"),
     ],
 )
 def test_what_is_right_somewhere_is_said_to_be_so_on_ordinary_draws(words, told):

@@ -166,7 +166,7 @@ def test_the_line_and_the_slip_are_told(right, wrong, said):
             x = x / np.linalg.norm(x)
             return len(b) * np.linalg.norm(b - (b @ x) * x)
             """,
-            "in line 2, `(9 * a).astype(int)`: `astype` is to be left out.",
+            "in line 2, `(9 * a).astype(int)`: `astype` is to be left out, so that `9 * a` stands alone.",
         ),
         (
             """
@@ -537,7 +537,7 @@ def test_a_wrong_value_is_told_where_it_is_bound_not_where_it_is_read():
     """
     said = item.judge(typed(body, "robust_weights", "residuals"), rng=np.random.default_rng(0)).text
     assert "in line 2, `length = np.abs(residuals).max(axis=1)`: this value is not right" in said
-    assert "for one that goes into it" not in said
+    assert "perhaps because of" not in said
 
 
 def test_a_wrong_value_may_be_wrong_for_one_that_goes_into_it():
@@ -550,17 +550,14 @@ def test_a_wrong_value_may_be_wrong_for_one_that_goes_into_it():
     """
     wrong = typed(body, "landmark_weight", "pose, z, landmarks, std_range, std_bearing")
     said = item.judge(wrong, rng=np.random.default_rng(0)).text
-    assert (
-        "in line 3, `turn = " in said and "this value is not right, perhaps because of one that goes into it." in said
-    )
+    assert "in line 3, `turn = " in said and "this value is not right, perhaps because of `seen` in it." in said
 
 
 def test_a_wrong_value_may_be_wrong_for_an_argument_that_is_bound_anew():
     body = "T_WA = np.abs(T_WA)\nT_WB = np.abs(2 * T_WB)\nT = np.linalg.solve(T_WA, T_WB)\nreturn T"
     said = told_of("relative", body, "T_WA, T_WB")
-    assert (
-        "`T = np.linalg.solve(T_WA, T_WB)`: this value is not right, perhaps because of one that goes into it." in said
-    )
+    solved = "`T = np.linalg.solve(T_WA, T_WB)`: this value is not right"
+    assert f"{solved}, perhaps because of `T_WA` or `T_WB` in it." in said
 
 
 def test_a_loop_that_takes_the_rows_of_the_solutions_array_one_by_one_is_compared_with_them():

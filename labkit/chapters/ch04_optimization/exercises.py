@@ -1568,7 +1568,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     beyond.other_places(lambda n: np.linspace(0, 1, n + 2)[1:-1]),
-                    "Your places leave out the ends: n of them, both ends included, is `np.linspace(0, 1, n)`.",
+                    "This comes out where the ends, which count nothing, are left out, or come on top of n places between them: n of them, "
+                    "both ends included, is `np.linspace(0, 1, n)`.",
                     id="chord-no-ends",
                 ),
                 Mistake(
@@ -1861,7 +1862,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda cost, new_cost, g, B, step: (cost - new_cost) / abs(_predicted(g, B, step)),
-                    "Right where the model promises a decrease. Where it promises a rise, the promise keeps its sign: no absolute value.",
+                    "Right where the model promises a decrease. Where it promises a rise, the predicted decrease is below 0: −(gᵀh + ½ hᵀB h), whatever its sign, and not its absolute value.",
                     id="gain-absolute-promise",
                 ),
                 Mistake(
@@ -2343,6 +2344,11 @@ CHAPTER = Chapter(
                     id="luck-e6d3d2",
                 ),
                 Mistake(lambda: (1 - 0.5**4) ** 5, "That is the probability that none of the five is right."),
+                Mistake(
+                    lambda: (1 - 0.5**5) ** 4,
+                    "That each landing is right for some stand-in or other is more likely: here one and the same must have all four right.",
+                    id="luck-each-by-some",
+                ),
                 Mistake(
                     lambda: 1 - (1 - 0.5**5) ** 4, "Four and five are exchanged: four landings each, five stand-ins."
                 ),

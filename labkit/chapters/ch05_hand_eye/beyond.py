@@ -940,6 +940,11 @@ LITERATURE = [
         noisy=(
             (functools.partial(translated_poses, std=0.01), metrics.Rotations(0.2)),
             (
+                nearly_in_a_plane,
+                metrics.Rotations(5.0),
+                "right where the moves fill space, but not where they lie nearly in a plane:",
+            ),
+            (
                 visited_twice,
                 metrics.Rotations(1e-6),
                 "right, but not where the second and the third of four poses are at one place (is each of them heard?):",
@@ -956,11 +961,6 @@ LITERATURE = [
                     metrics.Rotations(0.5),
                     "right without noise, but not for 40 noisy poses and more nearly on a line, all but three (are all heard?):",
                 ),
-            ),
-            (
-                nearly_in_a_plane,
-                metrics.Rotations(5.0),
-                "right where the moves fill space, but not where they lie nearly in a plane:",
             ),
         ),
         hints=(
