@@ -279,7 +279,7 @@ def _repeated(function):
 
 
 def _counted_from_nought(function):
-    """A last entry less the first one: what is asked is how far the one is from the other, and the first need not be 0."""
+    """A last entry less the first one, which need not be 0: meant may be how far the one is from the other."""
     for node, put in _parts(function):
         index = node.slice if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) else None
         if index is not None and ast.unparse(index) == "-1" and isinstance(node.ctx, ast.Load):
@@ -437,8 +437,8 @@ def mending(function):
     """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer,
     gone on with or begun at 0, an axis, an outer product, an index that a loop should count, an argument or a size that
     is typed in, a pi of three digits, the sign that a root has lost, a diagonal that is meant or is not, a share that a
-    comparison allows, a list that is repeated, a first entry that is not taken off the last one, what rounding brings beyond what a function takes, and one slip mended
-    wherever it stands: who copies a line copies its slip.
+    comparison allows, a list that is repeated, a first entry that is not taken off the last one, what rounding brings
+    beyond what a function takes, and one slip mended wherever it stands: who copies a line copies its slip.
     """
     found = changes(function)
     narrower = list(_narrower(function, found))
@@ -957,7 +957,7 @@ REVERSED = (  # (words of what was changed in a right formula, what is wrong whe
     (r"with one part squared", "the square of this belongs there"),
     (r"with the root of one part taken", "the root of this belongs there"),
     (IN_DEGREES, "this belongs there in degrees"),
-    (r"along another axis in one call", "the axis is another one"),
+    (r"along another axis in one call", "another axis belongs there"),
     (r"with ([01]) in the place of one part", r"\1 belongs in the place of this"),
     (r"with one slice taken to the end", "what stands behind this slice is left out, and belongs there"),
     (r"with one slice taken from the start", "what stands before this slice is left out, and belongs there"),

@@ -620,7 +620,7 @@ OTHERWISE = (  # (what it should have been, function of the value [and of an arg
     (ONE, np.ones_like),
     (IDENTITY, lambda v: 0 * _square(v) + np.eye(v.shape[-1])),
     ("it is to be divided by its length", _normalized),
-    ("each of its rows is to be divided by its own length", _rows_normalized),
+    ("each row of it is to be divided by the length of that row", _rows_normalized),
     ("the mean of its rows is to be taken off", _with_own_rows),
     ("the mean of its rows belongs there", lambda v: _matrix(_long(v)).mean(axis=0)),
     ("the sum of its rows belongs there", lambda v: _matrix(_long(v)).sum(axis=0)),

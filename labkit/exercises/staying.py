@@ -138,8 +138,10 @@ class Staying(Evidence):
             as_then = same_numbers(numbers_of(run.result), numbers_of(before.result))
             if as_then or self._is_right_on(self.defaults.fresh, args, exercise.metric, expected):
                 told = "returns what it returned then" if as_then else "is no longer right"
+                another = f"another `{name}`" + (" that is the same in a part" if parts >= 0 else "")
+                rest = " and all else as before" if len(args) > 1 else ""
                 return (
-                    f"right at first, but called again with another `{name}` and all else as before, your function "
+                    f"right at first, but called again with {another}{rest}, your function "
                     f"{told}: is a result kept under a key that leaves a part of the arguments out?"
                     f"{self._about_globals()}"
                 )

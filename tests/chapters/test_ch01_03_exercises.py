@@ -494,7 +494,7 @@ def test_an_affine_map_is_no_fit_of_a_frame(centered):
         T[:3, 3] = points_W.mean(0) - T[:3, :3] @ points_F.mean(0)
         return T
 
-    assert "any linear map" in FRAMES["fit_frame"].judge(fit, rng=np.random.default_rng(0)).text
+    assert "arbitrary linear map" in FRAMES["fit_frame"].judge(fit, rng=np.random.default_rng(0)).text
 
 
 def two_links_at_least(transforms):
@@ -937,7 +937,7 @@ def _hole_along_x():
         (exercises, "worst_at_one_meter", _by_the_arccosine(lambda angle, d: 1000 * angle), "turn alone"),
         (exercises, "worst_at_one_meter", _by_the_arccosine(lambda angle, d: 1000 * angle + d), "none is that bad"),
         (exercises, "even_lever", _lever_of_a_measured_link, "the third link alone"),
-        (ch01_exercises, "distance", _hole_by_matrices, "the root of 2 times the distance"),
+        (ch01_exercises, "distance", _hole_by_matrices, "the distance times the root of 2"),
         (ch01_exercises, "distance", _hole_along_x, "lies off in y too"),
         (ch01_exercises, "angle_deg", lambda: 90 + np.rad2deg(np.arcsin(0.01)), "180 deg less the angle"),
         (exercises, "worst_at_one_meter", _farthest_point, "Subtract p"),

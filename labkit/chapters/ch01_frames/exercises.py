@@ -1031,7 +1031,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: 90 - np.rad2deg(frames.rotation_angle(_K0_T_K1())),
-                    "This is what is missing at 90 deg. By what angle is K1 turned?",
+                    "This is what is missing to 90 deg. By what angle is K1 turned?",
                     id="angle-complement",
                 ),
                 Mistake(
@@ -1134,7 +1134,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: np.sqrt(2) * np.linalg.norm(_hole() - _hole_as_drawn()),
-                    "This is the root of 2 times the distance. So is 200 mm times the norm of the difference of both matrices, in "
+                    "This is the distance times the root of 2. So is 200 mm times the norm of the difference of both matrices, in "
                     "which x and y both count. The hole lies on x alone.",
                     id="distance-of-matrices",
                 ),
@@ -1175,17 +1175,17 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda: 0.01,
-                    "0.01 is by how much the points were moved, and nearly the angle that is missing at 90 deg, in rad. How much is it 200 mm away?",
+                    "0.01 is by how much the points were moved, and nearly the angle that is missing to 90 deg, in rad. How much is it 200 mm away?",
                     id="distance-moved",
                 ),
                 Mistake(
                     _missing,
-                    "This is the angle that is missing at 90 deg, in rad. How much is it 200 mm away?",
+                    "This is the angle that is missing to 90 deg, in rad. How much is it 200 mm away?",
                     id="distance-angle",
                 ),
                 Mistake(
                     lambda: np.rad2deg(_missing()),
-                    "This is the angle that is missing at 90 deg. How much is it 200 mm away, in mm?",
+                    "This is the angle that is missing to 90 deg. How much is it 200 mm away, in mm?",
                     id="distance-angle-deg",
                 ),
                 Mistake(
@@ -1678,7 +1678,7 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         _affine_first(handed),
-                        "You fitted any linear map, and made a rotation of it afterwards. The rotation nearest to that map is not the one "
+                        "You fitted an arbitrary linear map, and made a rotation of it afterwards. The rotation nearest to that map is not the one "
                         "that lies best to the points: take the SVD of p^T q.",
                         id=f"fit-frame-affine-{handed}",
                     )

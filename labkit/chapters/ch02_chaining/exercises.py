@@ -504,7 +504,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda Ts: chaining.chain(Ts[::-1]),
-                    "This is the product in the reverse order. In a loop over the links as they come, each new one goes to the right of what you have, where its letters meet.",
+                    "This is the product in the reverse order. In a loop over the links as they come, each new one goes to the right of what you have.",
                     id="chain-953c02",
                 ),
                 Mistake(

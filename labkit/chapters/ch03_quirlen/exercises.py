@@ -316,7 +316,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _with_pivot_block(lambda n: np.repeat(-np.eye(3), n, axis=0)),
-                    "The rows of -I come out of step with those of R: each stands n times below itself, as `np.repeat` does it. "
+                    "The rows of -I come out of step with those of R: each row comes n times before the next, as `np.repeat` does it. "
                     "`np.tile(-np.eye(3), (n, 1))` repeats the block.",
                     id="pivot_matrix-cfcc5e",
                 ),

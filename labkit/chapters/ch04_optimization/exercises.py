@@ -1476,14 +1476,14 @@ CHAPTER = Chapter(
             noisy=[(draw, metrics.Numbers(tol, least=least), words) for draw, tol, least, words in beyond.CHORDS],
             hints=(
                 "Walk from x to y, and at each place compare f with the straight line between its two ends.",
-                "At share t the place is (1 − t) x + t y, and the chord stands at (1 − t) f(x) + t f(y). Of the differences f − chord take the largest.",
+                "At the fraction t the place is (1 − t) x + t y, and the chord stands at (1 − t) f(x) + t f(y). Of the differences f − chord take the largest.",
                 "`t = np.linspace(0, 1, n)\nvalues = np.array([f((1 - s) * x + s * y) for s in t])\n"
                 "return (values - ((1 - t) * f(x) + t * f(y))).max()`",
             ),
             mistakes=[
                 Mistake(
                     beyond.chords(lambda t, v, c: (v - c[::-1]).max()),
-                    "Your chord has its ends exchanged: at share t the place is (1 − t) x + t y, and its height (1 − t) f(x) + t f(y).",
+                    "Your chord has its ends exchanged: at the fraction t the place is (1 − t) x + t y, and its height (1 − t) f(x) + t f(y).",
                     id="chord-ends",
                 ),
                 Mistake(
@@ -1553,7 +1553,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     beyond.chords(lambda t, v, c: t[np.argmax(v - c)]),
-                    "That is the share t at which f rises most: return the rise there.",
+                    "That is the fraction t at which f rises most: return the rise there.",
                     id="chord-share",
                 ),
                 Mistake(
@@ -1778,12 +1778,12 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda r, J, damping: opt.damped_step(r, J, damping**2),
-                    "λ counts squared. In the normal equations stands λ I, and beneath J, who solves by least squares, √λ I.",
+                    "λ counts squared. In the normal equations stands λ I, and √λ I beneath J, for who solves by least squares.",
                     id="damped-squared",
                 ),
                 Mistake(
                     lambda r, J, damping: opt.damped_step(r, J, np.sqrt(damping)),
-                    "The root of λ counts in place of λ. In the normal equations stands λ I, and beneath J, who solves by least squares, √λ I.",
+                    "The root of λ counts in place of λ. In the normal equations stands λ I, and √λ I beneath J, for who solves by least squares.",
                     id="damped-root",
                 ),
                 Mistake(

@@ -1830,7 +1830,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda x, P, u, t, Q: (step_euler(x, u, t), propagate(step_euler(x, u, t), P, u, t, Q)[1]),
-                    "Your Jacobians are taken at the new pose. The step was linearized at the old one.",
+                    "Your Jacobians are taken at the new pose. They belong at the old one, where the step begins.",
+                    id="propagate-8e456c",
                 ),
                 Mistake(
                     _propagated(lambda F, G, P, Q: F * P * F.T + G @ Q @ G.T),
@@ -2120,11 +2121,12 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _offset(lambda d, turn, way: d * turn / 2),
-                    "Right to first order. Over a long way the arc bends: use the circle itself.",
+                    "Right to first order. Where the robot turns far, that is not enough: use the circle itself.",
+                    id="wheel_offset-553a5b",
                 ),
                 Mistake(
                     _offset(lambda d, turn, way: way * turn / 2),
-                    "Right to first order. Over a long way the arc bends, and the middle does not go the way that was counted: use the circle.",
+                    "Right to first order. Where the robot turns far, that is not enough, and the middle does not go the way that was counted: use the circle.",
                     "wheel_offset-d23ac4",
                 ),
                 Mistake(
@@ -2134,7 +2136,7 @@ CHAPTER = Chapter(
                 Mistake(
                     _offset(lambda d, turn, way: way / turn * (1 - np.cos(turn))),
                     "Here the middle of the robot goes the way that was counted. The left wheel goes that way, the middle "
-                    "way (1 + excess / 2): on a circle whose radius is larger by half a track.",
+                    "way (1 + excess / 2): on a circle whose signed radius is larger by half a track.",
                     "wheel_offset-6b4841",
                 ),
                 Mistake(

@@ -910,7 +910,7 @@ CHAPTER = Chapter(
                 "return int(np.argmin(left))`",
             ),
             mistakes=[
-                *(Mistake(rule, "Your choice is that of the smallest trace, of the smallest norm, or of the smallest largest eigenvalue. Among squares of different units the largest numbers decide alone: compare determinants.", id=id)
+                *(Mistake(rule, "Your choice is that of the smallest trace, of the smallest norm, or of the eigenvalues that stay smallest at their largest. Among squares of different units the largest numbers decide alone: compare determinants.", id=id)
                   for rule, id in ((_smallest_trace, "next_pose-c25375"), (_smallest_norm, "next_pose-c25375-2"), (_largest_eigenvalue, "next_pose-c25375-3"))),
                 Mistake(lambda C, c: next_pose(C, c) * int(_volumes(C, c).min() < 1),
                         "Right where a determinant is below 1, else the first one: does your search begin with the number 1? Begin with infinity, or with the first candidate's own."),
@@ -962,7 +962,7 @@ CHAPTER = Chapter(
                 "return times * std / np.sqrt(1 - h)`",
             ),
             mistakes=[
-                Mistake(lambda J, s, k: k * s / (1 - _shares(J)), "The noise of a residual shrinks as well, by the root of 1 - h: one root is left in the denominator."),
+                Mistake(lambda J, s, k: k * s / (1 - _shares(J)), "The noise of a residual shrinks as well, by the root of 1 - h: what is left to divide by is that root.", id="visible-e13cb4"),
                 Mistake(lambda J, s, k: k * s * np.sqrt(1 - _shares(J)),
                         "This is how large the residual is. The error behind it is larger, by 1 / (1 - h)."),
                 Mistake(lambda J, s, k: k * s * (1 - _shares(J)), "A number with a large share hides its error better, not worse: divide by the root of 1 - h."),
