@@ -84,7 +84,7 @@ def measured_gradient(f, x, h):
 
 
 # %% compare-gradient
-x = np.array([0.3, -0.7])
+x = np.array([0.3, -0.4])
 off = np.abs(gradient(x) - measured_gradient(wells.value, x, 1e-4)).max()
 print(f"your gradient at {x}: {gradient(x)}")
 print("within 1e-4 of the measured one:", off < 1e-4)

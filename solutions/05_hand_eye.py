@@ -841,7 +841,7 @@ for name, T_FS in (("CAD", cad), ("calibrated",
 
 # %% cad-length-text [markdown]
 # The length is right and the place is wrong: by the CAD pose the first mark lies 31 mm too high, and a nozzle sent there stops in the air. Now the flange makes half a turn between the marks (poses
-# `turned`, marks as `seen`). What length does the CAD pose give?
+# `turned`; the scanner sees the marks as before, `seen`). What length does the CAD pose give?
 
 # %% cad_length
 cad_length = ...  # your code here

@@ -288,6 +288,18 @@ def _counted_from_nought(function):
             yield Change("", mends, 1, node, put(ast.BinOp(node, ast.Sub(), first)))
 
 
+def _of_one_triangle(function):
+    """Triangular systems of which the lower triangle is meant, or the whole matrix."""
+    for node, put in _parts(function):
+        if isinstance(node, ast.Call) and _called(node) == "solve_triangular" and len(node.args) == 2:
+            if not any(keyword.arg == "lower" for keyword in node.keywords):
+                lower = ast.keyword("lower", ast.Constant(True))
+                mends = "this reads the upper triangle alone: `lower=True` is missing"
+                yield Change("", mends, 0, node, put(ast.Call(node.func, node.args, [*node.keywords, lower])))
+            mends = "`solve_triangular` reads one triangle alone: `np.linalg.solve` belongs there, of the whole matrix"
+            yield Change("", mends, 1, node, put(ast.Call(_linalg("solve"), node.args, [])))
+
+
 def _of_diagonals(function):
     """Sums of rows or columns where the diagonal is meant, and a matrix with all but its diagonal set to 0."""
     for node, put in _parts(function):
@@ -437,8 +449,9 @@ def mending(function):
     """What may mend a function: all single changes, and besides them bounds and steps made finer, loops made longer,
     gone on with or begun at 0, an axis, an outer product, an index that a loop should count, an argument or a size that
     is typed in, a pi of three digits, the sign that a root has lost, a diagonal that is meant or is not, a share that a
-    comparison allows, a list that is repeated, a first entry that is not taken off the last one, what rounding brings
-    beyond what a function takes, and one slip mended wherever it stands: who copies a line copies its slip.
+    comparison allows, a list that is repeated, a first entry that is not taken off the last one, a triangle, what
+    rounding brings beyond what a function takes, and one slip mended wherever it stands: who copies a line copies its
+    slip.
     """
     found = changes(function)
     narrower = list(_narrower(function, found))
@@ -464,7 +477,7 @@ def mending(function):
     found += _sizes(function)
     found += _of_no_share(function)
     found += _repeated(function)
-    found += _counted_from_nought(function)
+    found += [*_counted_from_nought(function), *_of_one_triangle(function)]
     found += _kept_within(function)
     meant = {*_digits_left(function), *_not_repeated(function), *_typed_starts(function)}
     return sorted((change for change in found if change.place not in meant), key=lambda change: change.rank)
@@ -651,9 +664,11 @@ def _finer(function):
                 number = getattr(owner, side)
                 if _is_coarse(number, ADDED):
                     yield _with_a_part_of_it(FINER, owner, side)
-        elif isinstance(owner, ast.Assign) and _is_coarse(owner.value):
-            for part in LESS:
-                yield _with_a_part_of_it(2, owner, "value", part)
+        elif isinstance(owner, ast.Assign):
+            both = isinstance(owner.value, ast.Tuple)
+            for k, number in enumerate(owner.value.elts if both else [owner.value]):
+                for part in LESS if _is_coarse(number) else ():
+                    yield _with_a_part_of_it(2, *((owner.value, "elts") if both else (owner, "value")), part, k)
         elif isinstance(owner, ast.For) and getattr(getattr(owner.iter, "func", None), "id", "") == "range":
             given = owner.iter.args
             if len(given) == 1 and isinstance(given[0], ast.Constant) and type(given[0].value) is int:
@@ -901,13 +916,14 @@ def _is_coarse(node, most=1.0):
     return isinstance(node, ast.Constant) and type(node.value) is float and COARSE <= node.value <= most
 
 
-def _with_a_part_of_it(rank, place, field, part=FINE):
-    """A number that is typed in made far smaller."""
+def _with_a_part_of_it(rank, place, field, part=FINE, k=0):
+    """A number that is typed in, the k-th where there are several, made far smaller."""
     content = getattr(place, field)
-    number = content[0] if isinstance(content, list) else content
+    number = content[k] if isinstance(content, list) else content
     new = ast.copy_location(ast.Constant(part * number.value), number)
     mends = f"`{ast.unparse(number)}` is far too large: a {LESS[part]} of it will do"
-    return Change("", mends, rank, place, ((place, field, [new] if isinstance(content, list) else new),))
+    whole = [*content[:k], new, *content[k + 1 :]] if isinstance(content, list) else new
+    return Change("", mends, rank, place, ((place, field, whole),))
 
 
 def _parts(function):
@@ -1087,6 +1103,10 @@ def _transposed(node):
     return ast.Attribute(node, "T", ast.Load())
 
 
+def _linalg(name):
+    return ast.Attribute(ast.Attribute(ast.Name("np", ast.Load()), "linalg", ast.Load()), name, ast.Load())
+
+
 def _numpy(name, *args):
     return ast.Call(ast.Attribute(ast.Name("np", ast.Load()), name, ast.Load()), list(args), [])
 
@@ -1241,7 +1261,7 @@ def _name(node, names):
             yield 3, f"with `{other}` in one place where {here} belongs", ast.Name(other, ast.Load())
     for other in own:
         if other != node.id:
-            yield 4, "with another intermediate result in one place", ast.Name(other, ast.Load())
+            yield 4, "with one intermediate result in the place of another", ast.Name(other, ast.Load())
     yield 2, "with one sign turned", ast.UnaryOp(ast.USub(), node)
     for number in (0, 1):
         yield 3, f"with {number} in one place where {here} belongs", ast.Constant(number)

@@ -464,6 +464,16 @@ def _gradient(power=2, depths=wells.DEPTHS, **changes):
     return variant
 
 
+def _gradient_with_one_q(k):
+    """With the q of well k for both wells."""
+
+    def variant(x):
+        d, q = _terms(x)
+        return (2 * wells.DEPTHS / q[k] ** 2) @ d
+
+    return variant
+
+
 def _factors(x):
     """What multiplies x - c of each well in the gradient."""
     return 2 * wells.DEPTHS / _terms(x)[1] ** 2
@@ -809,6 +819,14 @@ CHAPTER = Chapter(
                 Mistake(_gradient(depths=(100.0, 0.0)), "This is the well at (1, 1) alone: add the one at (−1, −2)."),
                 Mistake(_gradient(depths=(0.0, 200.0)), "This is the well at (−1, −2) alone: add the one at (1, 1)."),
                 *_one_well_alone(_gradient, "gradient"),
+                *(
+                    Mistake(
+                        _gradient_with_one_q(k),
+                        f"Both terms are divided by the q of the well at {center}. Each well has a q of its own, |x − c|² + 1.",
+                        id=f"gradient-q-of-{k}",
+                    )
+                    for k, center in enumerate(("(1, 1)", "(−1, −2)"))
+                ),
                 Mistake(
                     _gradient(depths=(200.0, 100.0)),
                     "The depths are exchanged: w = 100 at (1, 1), w = 200 at (−1, −2).",

@@ -763,6 +763,13 @@ def _circle(model="euler", **changes):
     return poses[-1], covs[-1]
 
 
+def _in_one_step():
+    """The covariance after one step as long as the whole drive, with its first control."""
+    drive = lecture.circle_drive()
+    u, T = drive.controls[0], len(drive.controls) * drive.dt
+    return propagate(np.zeros(3), np.zeros((3, 3)), u, T, odometry.control_covariance(u, T, **drive.noise))[1]
+
+
 @functools.cache
 def _loop(step=propagate, steps=None, again=0, start_cov=0.0, at_the_end=False, noise_time=None, **noise):
     """The loop over the circle with another step, fewer or more steps, another start or other constants of the noise."""
@@ -1984,6 +1991,11 @@ CHAPTER = Chapter(
                     _without_carrying,
                     "Here the noise of the steps is added up, no more. Earlier heading errors also move all later positions: F_x cov F_x^T.",
                     id="end_cov-53000c",
+                ),
+                Mistake(
+                    _in_one_step,
+                    "This takes the whole drive as one step. There are 140, and each begins where the one before ended, with another heading.",
+                    id="end-cov-one-step",
                 ),
                 Mistake(
                     lambda: _circle("midpoint")[1],

@@ -120,9 +120,9 @@ def one_position_two_sensors(rng, better=0, var0=(2, 9)):
     return x + rng.normal(), rng.uniform(*var0), x + rng.uniform(-1, 1, 2), stds
 
 
-def steady_vehicle(rng):
-    """The lecture's vehicle, its position counted forward or backward."""
-    A, B, C = kalman.vehicle_model(rng.uniform(0.1, 0.5))
+def steady_vehicle(rng, T=(0.1, 0.5)):
+    """The lecture's vehicle, its position counted forward or backward; T: bounds of the time step, s."""
+    A, B, C = kalman.vehicle_model(rng.uniform(*T))
     return (
         A,
         rng.choice([-1, 1]) * C,
@@ -792,6 +792,16 @@ def _ekf_by_the_slope(x, cov, u, dt, cov_u, z, landmark, cov_z):
     return moved + K @ y, _shrunk(cov, K, H)
 
 
+def _sum_wrapped(x, cov, u, dt, cov_u, z, landmark, cov_z):
+    """Of z - h(x) + H x, from which `update` takes H x again, the bearing is wrapped, and not that of z - h(x)."""
+    moved, cov = _ekf(short=True)(x, cov, u, dt, cov_u, z, landmark, cov_z)
+    H = measurement_jacobian(moved, landmark)
+    pseudo = z - measurement(moved, landmark) + H @ moved
+    pseudo[1] = wrapped(pseudo[1])
+    K = _gain(cov, H, cov_z)
+    return moved + K @ (pseudo - H @ moved), _shrunk(cov, K, H)
+
+
 def _ekf_in_degrees(x, cov, u, dt, cov_u, z, landmark, cov_z):
     moved, cov = _ekf(short=True)(x, cov, u, dt, cov_u, z, landmark, cov_z)
     H, expected = measurement_jacobian(moved, landmark), measurement(moved, landmark)
@@ -1459,6 +1469,11 @@ CHAPTER = Chapter(
                     "This takes the 20 as a standard deviation. Interesting: that gives the printed 9.6. But the page writes Sigma_0, a variance.",
                     id="fused-ef2548",
                 ),
+                Mistake(
+                    lambda: _fusion(z1=9.407),
+                    "This takes 9.407 for the first reading, which would give the printed 9.6. The page prints 9.4: take that.",
+                    id="fused-unprinted",
+                ),
                 Mistake(lambda: 9.6, "This is what the page prints. It is not what its numbers give: compute it."),
                 Mistake(
                     lambda: _fusion(std1=0.25, std2=1.0),
@@ -1517,6 +1532,7 @@ CHAPTER = Chapter(
                 functools.partial(steady_system, n=3, m=2),
                 functools.partial(steady_system, n=2, m=2),
                 steady_vehicle,
+                functools.partial(steady_vehicle, T=(1.0, 2.0)),  # where what enters the position would tell
                 functools.partial(steady_system, n=3, m=1),
             ),
             metric=metrics.Numbers(1e-3),
@@ -2364,6 +2380,11 @@ CHAPTER = Chapter(
                 Mistake(
                     _ekf_by_the_slope,
                     "Your innovation is z - H x. The sensor measures by the bent function: z - measurement(x, landmark). H is only its slope.",
+                ),
+                Mistake(
+                    _sum_wrapped,
+                    "The bearing is wrapped after H x is added to it. What is an angle is the difference of measured and expected bearing: wrap that, before anything is added.",
+                    id="ekf-sum-wrapped",
                 ),
                 Mistake(
                     _ekf_in_degrees,

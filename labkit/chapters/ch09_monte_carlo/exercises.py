@@ -257,6 +257,12 @@ def short_ray(rng):
             return *ray, r - 0.3
 
 
+def ray_that_ends_just_before(rng):
+    """The same with an r_max nearly a cell before the wall."""
+    ray, r = long_ray(rng)
+    return *ray, r - rng.uniform(0.8, 0.95) * ray[0].resolution
+
+
 def ray_that_just_arrives(rng):
     """The same with an r_max a little behind the wall."""
     ray, r = long_ray(rng)
@@ -2681,6 +2687,11 @@ CHAPTER = Chapter(
                     short_ray,
                     Reach(0.16, "m", absolute=True),
                     "Right on rays to a wall with r_max = 18 m, but not on one that ends at r_max, some 30 cm before a wall:",
+                ),
+                (
+                    ray_that_ends_just_before,
+                    Reach(0.06, "m", absolute=True),
+                    "Right on other rays, but not on one that ends at r_max, nearly a cell before a wall (does yours look beyond r_max?):",
                 ),
                 (
                     ray_to_a_thin_wall,

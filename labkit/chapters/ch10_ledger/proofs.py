@@ -139,6 +139,22 @@ def _never_put_back(f, printed):
     return found
 
 
+def _moved_on(f, printed):
+    """Each number goes up and down from where those before it went up, and is compared with f there."""
+    x, halves = read(printed)
+    found = 0.0
+    for step in halves * np.eye(len(x)):
+        found += max(abs(f(x + step) - f(x)), abs(f(x - step) - f(x)))
+        x = x + step
+    return found
+
+
+def _larger_both_ways(f, printed):
+    """The larger of what f gains where each number goes up, and of what it gains on the way back from down."""
+    up, down = map(np.array, _moves(f, printed))
+    return np.where(np.abs(up) >= np.abs(down), up, -down)
+
+
 def _up_and_left_down(f, printed):
     x, halves = read(printed)
     found = 0.0
@@ -280,6 +296,12 @@ BOUND = Exercise(
             "absolute value of each before you add.",
         ),
         Mistake(
+            lambda f, p: abs(_larger_both_ways(f, p).sum()),
+            "Of each number you took the larger move, but with a sign, so that they cancel in the sum: take the "
+            "absolute value of each before you add.",
+            id="bound-signs-both-ways",
+        ),
+        Mistake(
             lambda f, p: _larger(f, p)[:2].sum(),
             "You moved the first two numbers only. Each of them counts, however many there are.",
         ),
@@ -318,6 +340,12 @@ BOUND = Exercise(
         Mistake(
             _up_and_left_down,
             "A number that went up and down stays down while the next one moves: put each back to where it was.",
+        ),
+        Mistake(
+            _moved_on,
+            "Each number stays moved up while the next one moves: put it back to where it was, and compare with f of "
+            "the numbers as they are printed.",
+            id="bound-moved-on",
         ),
         Mistake(
             _never_put_back,

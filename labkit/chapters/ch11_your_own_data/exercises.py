@@ -910,7 +910,7 @@ CHAPTER = Chapter(
                 "return int(np.argmin(left))`",
             ),
             mistakes=[
-                *(Mistake(rule, "Your choice is that of the smallest trace, of the smallest norm, or of the eigenvalues that stay smallest at their largest. Among squares of different units the largest numbers decide alone: compare determinants.", id=id)
+                *(Mistake(rule, "Your choice is that of the smallest trace, of the smallest norm, or of the smallest of the largest eigenvalues. Among squares of different units the largest numbers decide alone: compare determinants.", id=id)
                   for rule, id in ((_smallest_trace, "next_pose-c25375"), (_smallest_norm, "next_pose-c25375-2"), (_largest_eigenvalue, "next_pose-c25375-3"))),
                 Mistake(lambda C, c: next_pose(C, c) * int(_volumes(C, c).min() < 1),
                         "Right where a determinant is below 1, else the first one: does your search begin with the number 1? Begin with infinity, or with the first candidate's own."),
