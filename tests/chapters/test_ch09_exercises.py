@@ -691,6 +691,7 @@ PASSED_BEFORE = [
     ("sample_motion", turned_after_the_step, "also bends the way"),
     ("sample_motion", divided_by_dt, "by std_u itself, whatever dt is. Was the noise"),
     ("cast_ray", walked(0.0, None, more=1.0), "A scanner sees r_max at most"),
+    ("cast_ray", walked(0.0, None, more=0.1), "nearly a cell before a wall (does yours look beyond r_max?)"),
     ("cast_ray", in_whole_cells, "You counted in cells"),
     ("multiply_weights", in_logarithms_doubled, "tiny likelihoods"),
     ("sample_motion", of_states_halved, "a particle must get from"),

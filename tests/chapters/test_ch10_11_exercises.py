@@ -153,6 +153,13 @@ def bound(f, printed):
         found += max(up, abs(f(x) - value))
     return found
 """
+BY_SLOPES = """
+def bound(f, printed):
+    x = np.array([float(text.replace(",", ".")) for text in printed])
+    halves = np.array([half_unit(text) for text in printed])
+    slopes = [(f(x + 3e-6 * e) - f(x - 3e-6 * e)) / 6e-6 for e in np.eye(len(x))]
+    return np.abs(slopes) @ halves
+"""
 FROM_ONE = """
 def next_pose(C, candidates):
     best, which = 1.0, 0
@@ -183,6 +190,7 @@ def left_out(r, J):
     [
         (ledger, "half_unit", POSITIVE, "An exponent may be positive"),
         (ledger, "bound", NEVER_BACK, "put each back to where it was"),
+        (ledger, "bound", BY_SLOPES, "the slope times the half unit"),
         (own, "next_pose", FROM_ONE, "begin with the number 1"),
         (own, "next_pose", VARIANCES, "You multiplied the variances"),
         (own, "between_axes", QUATERNIONS, "q and -q are the same turn"),

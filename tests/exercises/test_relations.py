@@ -119,6 +119,8 @@ def test_axes_that_point_the_other_way_are_named(metric, poses):
 def test_what_is_a_reflection_on_some_draws_is_said_of_these():
     pairs = [(R * (1, 1, 1 if k else -1), R) for k, R in enumerate(TURNS)]
     assert "is a reflection on some draws, its determinant" in relations.difference_words(metrics.Rotations(), pairs)
+    (off,) = metrics.Rotations().deviations(*pairs[0])
+    assert str(off).endswith("it is a reflection, its determinant is -1")
 
 
 def test_a_pose_that_is_wrong_in_one_part_says_by_how_much():

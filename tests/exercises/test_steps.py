@@ -1426,3 +1426,64 @@ def test_what_is_changed_where_the_result_is_right_and_stays_right_is_not_told(m
     assert judged(item, body).startswith("right, but not where all are alike:")
     monkeypatch.setattr(steps.Search, "_does_not_matter", lambda self, plan: False)
     assert "its entry 0" in judged(item, body)
+
+
+@pytest.mark.parametrize(
+    ("chapter", "id", "arguments", "body", "told"),
+    [
+        (
+            "08-kalman",
+            "gate",
+            "innovation, cov_innovation, limit",
+            """
+            from scipy.linalg import cholesky, solve_triangular
+            L = cholesky(cov_innovation, lower=True)
+            white = solve_triangular(L, innovation)
+            return bool(white @ white < limit)
+            """,
+            "this reads the upper triangle alone: `lower=True` is missing.",
+        ),
+        (
+            "04-optimization",
+            "newton_step",
+            "g, H",
+            "from scipy.linalg import solve_triangular\nreturn solve_triangular(H, -g)",
+            "reads one triangle alone: `np.linalg.solve` belongs there, of the whole matrix.",
+        ),
+        (
+            "04-optimization",
+            "gradient",
+            "x",
+            """
+            def f(a, b):
+                return -100 / ((a - 1) ** 2 + (b - 1) ** 2 + 1) - 200 / ((a + 1) ** 2 + (b + 2) ** 2 + 1)
+            (a, b), h = x, 0.02
+            return np.array([f(a + h, b) - f(a - h, b), f(a, b + h) - f(a, b - h)]) / (2 * h)
+            """,
+            "`0.02` is far too large: a thousandth of it will do.",
+        ),
+        (
+            "03-quirlen",
+            "robust_weights",
+            "distances, scale",
+            """
+            s = max(np.median(distances) / 0.6745, scale)
+            return np.where(distances < 7 * s, (1 - (distances / (7 * s)) ** 2) ** 2, 0.0)
+            """,
+            "`max` is to be left out, so that `scale` stands alone.",
+        ),
+    ],
+)
+def test_what_a_library_call_does_otherwise_than_meant_is_told(chapter, id, arguments, body, told):
+    item = next(c for c in session.chapters() if c.name == chapter)[id]
+    assert told in item.judge(typed(body, id, arguments), rng=np.random.default_rng(0)).text
+
+
+def test_a_last_entry_from_which_the_first_is_not_taken_is_told():
+    """Of times that do not begin at 0, the last one is no duration."""
+    body = "return b * a[-1] / (len(a) - 1)"
+    item = asked(
+        lambda a, b: b * (a[-1] - a[0]) / (len(a) - 1),
+        lambda rng: (rng.uniform(1, 9) + rng.uniform(0.1, 1) * np.arange(rng.integers(4, 9)), rng.normal()),
+    )
+    assert "`a[-1]`: `a[0]` is to be taken off, as that need not be 0." in judged(item, body)
