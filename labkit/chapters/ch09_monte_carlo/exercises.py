@@ -1580,6 +1580,23 @@ def _is_right_of_many(resample, rng):
     return None
 
 
+def _is_right_of_one_heavy(resample, rng):
+    """Many light weights and one that is as heavy as all of them together: who draws candidates and takes or refuses
+    them must go on until one is taken.
+    """
+    weights, k = np.ones(201), int(rng.integers(201))
+    weights[k] = 200.0
+    found = _draws(resample, weights, rng, 10)
+    if isinstance(found, str):
+        return f"with {len(weights)} weights: {found}."
+    if abs(found[k] - 0.5) < SHARE_OFF:
+        return None
+    return (
+        f"with 200 weights of 1 and one of 200, that one gets {100 * found[k]:.0f} % of the draws instead of 50 %: the share "
+        "is that of the weight, however many light ones there are beside it."
+    )
+
+
 THOUSAND, CALLS = np.tile([0.02, 0.04], 500), 32
 PATIENT = 0.4  # seconds of processor time for them: a slow but right roulette is called less often
 FAR = float(chdtri(len(THOUSAND) - 1, 1e-9))  # a right roulette is farther off in one of a thousand million checks
@@ -3035,6 +3052,7 @@ CHAPTER = Chapter(
                 _of_any_sum,
                 _of_whole_numbers,
                 _is_right_of_many,
+                _is_right_of_one_heavy,
                 _is_right_of_a_thousand,
             ),
             hints=(
