@@ -1,9 +1,11 @@
 """What is said of a wrong answer that is no named mistake: from what explains it whole to how far it is off."""
 
+import ast
 import copy
 import dis
 import functools
 import itertools
+import re
 import types
 
 import numpy as np
@@ -13,8 +15,8 @@ from . import steps as own_steps
 from .budget import Budget
 from .named import MORE_DRAWS, Named
 from .outcome import Mistake
-from .results import Refusal, are_one, could_change, equal_as_written, is_row, numbers_of
-from .wording import closed, leading, on_ordinary_draws, shown_whole
+from .results import Refusal, admitted_by, are_one, could_change, equal_as_written, is_row, numbers_of
+from .wording import closed, leading, on_ordinary_draws, short, shown_whole
 
 NOT_RIGHT = "\nNot right when called as "
 MORE_ACCURATE = ": is a case special there, or is it nearly right everywhere, and accurate enough there alone?"
@@ -324,9 +326,7 @@ class Explanations(Named):
             return near
         missed = [(args, *pair) for args, pair in zip(self.inputs, pairs) if not metric.equal(*pair)]
         shown = max(missed, key=lambda draw: _times_off(self._worst([draw[1:]])))
-        example = self._example(*shown)
-        if len(missed) < len(pairs):
-            example = example or f"{NOT_RIGHT}{self._call(shown[0])}"
+        example = self._example(*shown, len(missed) < len(pairs))
         own = isinstance(metric, metrics.Exactly) and type(metric).deviations is not metrics.Exactly.deviations
         words = None if own else cases.result_words(pairs)
         if 0 < len(missed) < len(pairs) and (axes := relations.turned_axes(metric, [pair for _, *pair in missed])):
@@ -354,16 +354,39 @@ class Explanations(Named):
         off = [d for pair in pairs for d in self.exercise.metric.deviations(*pair) if not d.within]
         return max(off, key=_times_off, default=None)
 
-    def _example(self, args, result, expected):
+    def _example(self, args, result, expected, somewhere_right):
         """One call that did not come out right, with what it gives, if all can be shown whole; the right result is told
-        where it is one of some words, a number stays to be found.
+        where it is one of some words, a number stays to be found. What is shown is what comes of the digits that are
+        shown: who types them gets it.
         """
-        call, mine = self._call(args), shown_whole(result)
+        call = self._call(args)
+        if "<" not in call:
+            typed = self._as_typed(args)
+            if typed is not None and self.exercise.metric.equal(*typed):
+                return ""
+            result, expected = typed or (result, expected)
+        mine = shown_whole(result)
         if "<" in call or mine is None:
-            return ""
+            kinds_alone = re.fullmatch(r"\w+\((\w+=<\w+>(, )?)*\)", call)
+            return f"{NOT_RIGHT}{call}" if somewhere_right and not kinds_alone else ""
         tells = isinstance(expected, str) and self._right_somewhere()
         right = f", and {shown_whole(expected)} is right" if tells else ""
         return f"{NOT_RIGHT}{call}: it gives {mine}{right}"
+
+    def _as_typed(self, args):
+        """(result, expected) for the digits of the arguments that a call shows; None where one of both fails there."""
+        args = [
+            np.array(ast.literal_eval(short(arg)), dtype=arg.dtype) if isinstance(arg, np.ndarray) else arg
+            for arg in args
+        ]
+        args = [float(short(arg)) if isinstance(arg, float) else arg for arg in args]
+        try:
+            expected = self.exercise.reference(*copy.deepcopy(args))
+        except Exception:  # of digits that are left, no matrix need be a rotation
+            return None
+        admitted = functools.partial(admitted_by, self.exercise.metric, expected)
+        run = guard.run(self.function, args, admitted, self.exercise.limit)
+        return None if run.error is not None or isinstance(run.result, Refusal) else (run.result, expected)
 
     def _right_parts(self):
         """Which of several results are right on all draws, as one more sentence; nothing where none or all are."""

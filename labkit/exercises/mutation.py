@@ -961,7 +961,6 @@ IN_DEGREES = "with one value times 180/pi, as from radians to degrees"
 REVERSED = (  # (words of what was changed in a right formula, what is wrong where the change mends)
     (r"with (.+) where (.+) belongs", r"\2 stands where \1 belongs"),
     (r"without one of its (.+)s", r"one \1 should be left out"),
-    (r"without one side of `(\w+)`", r"one side of `\1` should be left out"),
     (r"without `(\w+)=` in one call", r"`\1=` does not belong there"),
     (r"without `(\w+)`", r"`\1` is to be left out"),
     (r"without the (second argument of `norm`)", r"the \1 should be left out"),
@@ -995,6 +994,11 @@ def _mends(words, node, new):
         return ""
     if isinstance(node, ast.BinOp) and (new is node.left or new is node.right):
         return _left_out(node, new)
+    if isinstance(node, ast.BinOp) and isinstance(new, ast.UnaryOp) and new.operand is node.right:
+        return f"the term `{ast.unparse(node.left)}` should be left out"
+    if isinstance(node, ast.BoolOp) and words.startswith("without one side"):
+        kept = new.values if isinstance(new, ast.BoolOp) else [new]
+        return f"`{ast.unparse(next(v for v in node.values if v not in kept))}` should be left out"
     if words in (SECOND_LIKE_FIRST, FIRST_LIKE_SECOND):
         return f"`{ast.unparse(new)}` belongs there in all cases"
     for said, told in REVERSED:

@@ -510,6 +510,8 @@ class Search:
                         continue  # nobody sums up what is typed in, or turns it around
                     if words in rerun.WEIGHTS and value.ndim and self._is_weighed(k):
                         continue
+                    if words == rerun.ONE and value.ndim and self._is_given(k):
+                        continue  # whoever is handed an array does not mean ones
                     if _changes(function, value, others) and not self._is_all_of_it(k, function, value, others):
                         yield "value", k, change, argument
 
@@ -867,7 +869,13 @@ class Search:
         """Whether a value is but read there, by the name it was given in another line, and is none that is right."""
         name = self.written.places[k][1]
         given = name in self.names and self._is_given(k)  # an argument may have been bound anew
-        return name.isidentifier() and not (given or self._is_count(k)) and not self._is_known(k, solution, False)
+        settled = given or name not in self._variables or self._is_count(k)
+        return name.isidentifier() and not settled and not self._is_known(k, solution, False)
+
+    @functools.cached_property
+    def _variables(self):
+        """Names of what the function is given, and of what it binds."""
+        return {*self.names, *(name for _, code, name, *_ in self.written.places if name not in ("", code))}
 
     def _is_count(self, k):
         """Whether a value is one whole number on every draw."""

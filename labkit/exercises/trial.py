@@ -48,12 +48,11 @@ class Trial(Raised, Staying):
         if run.changed:
             changed = [f"`{name}`" for k, name in enumerate(self._names(args)) if k in run.changed]
             what = f"argument {changed[0]}" if len(changed) == 1 else f"arguments {joined(changed)}"
-            as_it_came = "it as it came" if len(changed) == 1 else "them as they came"
+            as_they_came = "it as it came" if len(changed) == 1 else "them as they came"
             advice = INTO_SECOND if "arctan" in scope.co_names(self.function) else ""
-            return self.outcome(
-                NOT_YET,
-                f"your function changes its {what} in place: leave {as_it_came}, and change copies.{advice}",
-            )
+            said = f"your function changes its {what} in place:"
+            told = f"{said} leave {as_they_came}, and change a copy, each time a new one"
+            return self.outcome(NOT_YET, f"{told}.{advice}")
         self.inputs.append(args)
         self.pairs.append((admitted[0], expected))
         self.metrics.append(metric)

@@ -2,7 +2,7 @@
 
 import contextlib
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from .outcome import CORRECT, NOT_YET, TO_DO, Item, Outcome, is_blank
 from .wording import closed
 
 LISTED = 9  # entries of a wrong array of which those that are right are listed
+WRITTEN = 8  # characters of a number that may have been rounded before it was typed in
+ALL_DIGITS = 1e-6  # of its size, by which two ways to compute a number may differ
 NEAR = 0.2  # of the largest entry: farther off, an array is not called near
 UNITS = {
     "mm": ("length", 1e-3),
@@ -135,7 +137,8 @@ class Value(Item):
         if digits > 1:
             least = f"right as far as it goes: at least {self.digits} digits are needed"
             return Outcome(NOT_YET, f"{least}. If it is rounded, hand over the computed value; else compute it finer.")
-        words = relations.difference_words(metric, [(answer, expected)]) or self._made_otherwise(answer)
+        words = relations.difference_words(_as_written(metric, answer, expected), [(answer, expected)])
+        words = words or self._made_otherwise(answer)
         words = words or self._changed(metric, answer, expected) or relations.ratio_words(answer, expected)
         words = words or self._follows(answer)
         return Outcome(NOT_YET, closed(words) if words else self._which_way(answer, expected))
@@ -173,6 +176,16 @@ class Value(Item):
 
     def _in_unit(self):
         return f" in {self.unit}" if self.unit else ""
+
+
+def _as_written(metric, answer, expected):
+    """The metric with no more tolerance than an answer of so many digits needs: two numbers that are made of each other
+    agree in all digits, others in some by chance.
+    """
+    if not isinstance(metric, metrics.Numbers) or np.ndim(answer) or len(f"{abs(float(answer)):.15g}") <= WRITTEN:
+        return metric
+    size = abs(float(expected))
+    return replace(metric, tol=min(metric.tol, ALL_DIGITS * size / max(metric.least, size)), absolute=False)
 
 
 def _right_entries(answer, expected):

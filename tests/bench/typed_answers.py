@@ -8,8 +8,8 @@ FOLDER holds one chNN.txt a chapter, written by people who saw the blank noteboo
 
 behind which the whole code of the exercise's cell follows. The notebook runs up to that cell, and the answer runs in
 its place, in a process of its own; once for each seed of the draws. What was said is written to
-FOLDER/verdicts/chNN.txt; printed are the wrong answers that were taken and the right ones that were refused, and a
-table. Whether the texts are true, somebody has to read.
+FOLDER/verdicts/chNN.txt, with --only of these alone; printed are the wrong answers that were taken and the right ones
+that were refused, and a table. Whether the texts are true, somebody has to read.
 """
 
 import argparse
@@ -178,7 +178,8 @@ def main():
     parser.add_argument("--only", nargs="+", default=[])
     parser.add_argument("--jobs", type=int, default=2)
     wanted = parser.parse_args()
-    numbers = wanted.chapters or sorted(path.stem[2:] for path in wanted.folder.glob("ch[0-9][0-9].txt"))
+    all_chapters = sorted(path.stem[2:] for path in wanted.folder.glob("ch[0-9][0-9].txt"))
+    numbers = wanted.chapters or sorted({answer[:2] for answer in wanted.only}) or all_chapters
     if not numbers:
         sys.exit(f"{wanted.folder} holds no file chNN.txt")
     print("chapter  wrong  accepted  right  refused  no verdict")

@@ -969,7 +969,7 @@ def test_loops_and_numbers_that_are_typed_in_are_told(reference, body, said):
 def test_a_column_that_is_nought_with_its_indices_exchanged_is_told_as_a_term_too_many():
     body = "S, T = np.eye(4), np.eye(4)\nS[:3, 3], T[:3, 3] = b, a\nreturn (S[:3, 3] - T[:3, 3]) ** 3"
     text = judged(asked(lambda a, b: -(a**3), two_vectors), body)
-    assert "`S[:3, 3] - T[:3, 3]`: one term should be left out." in text
+    assert "`S[:3, 3] - T[:3, 3]`: the term `S[:3, 3]` should be left out." in text
 
 
 @pytest.mark.parametrize(

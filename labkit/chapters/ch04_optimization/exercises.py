@@ -1796,12 +1796,12 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda r, J, damping: opt.damped_step(r, J, damping**2),
-                    "λ counts squared. In the normal equations stands λ I, and √λ I beneath J, for who solves by least squares.",
+                    "λ counts squared. In the normal equations stands λ I, and √λ I beneath J, for those who solve by least squares.",
                     id="damped-squared",
                 ),
                 Mistake(
                     lambda r, J, damping: opt.damped_step(r, J, np.sqrt(damping)),
-                    "The root of λ counts in place of λ. In the normal equations stands λ I, and √λ I beneath J, for who solves by least squares.",
+                    "The root of λ counts in place of λ. In the normal equations stands λ I, and √λ I beneath J, for those who solve by least squares.",
                     id="damped-root",
                 ),
                 Mistake(

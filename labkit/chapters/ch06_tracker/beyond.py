@@ -350,6 +350,11 @@ def _line(x, y, end=lambda intercept, slope: (np.sqrt(intercept), np.sqrt(slope)
     return variant
 
 
+def _with_a_linear_term(speed, error):
+    square, _, constant = np.polyfit(speed, error**2, 2)
+    return float(np.sqrt(max(constant, 0.0))), float(np.sqrt(max(square, 0.0)))
+
+
 def _ends_alone(speed, error):
     """The law through the first reading and the last."""
     slope, intercept = np.polyfit(speed[[0, -1]] ** 2, error[[0, -1]] ** 2, 1)
@@ -843,6 +848,12 @@ SPEEDS = [
                 _line(_square, _square, lambda i, s: (np.sqrt(i), 1000 * np.sqrt(s))),
                 "The lag is in milliseconds; wanted are seconds.",
                 id="static_error_and_lag-milliseconds",
+            ),
+            Mistake(
+                _with_a_linear_term,
+                "You fit a parabola in the speed, with a term of the speed itself: it takes up noise that belongs to the other two. The law has none: "
+                "error^2 is a straight line in speed^2.",
+                id="static_error_and_lag-parabola",
             ),
             Mistake(
                 _ends_alone,

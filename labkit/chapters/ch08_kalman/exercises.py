@@ -4,7 +4,7 @@ import functools
 import itertools
 
 import numpy as np
-from scipy.linalg import solve_continuous_are, solve_discrete_are
+from scipy.linalg import block_diag, solve_continuous_are, solve_discrete_are
 
 from ...documents.lecture import printed as lecture
 from ...estimation import kalman
@@ -1614,8 +1614,14 @@ CHAPTER = Chapter(
                     "This is A K, the gain of the form that predicts and corrects in one line. Here the correction's own gain is asked for.",
                 ),
                 Mistake(
+                    lambda A, C, Q, R: solve_continuous_are((A - np.eye(len(A))).T, C.T, Q, R) @ C.T @ np.linalg.inv(R),
+                    "This solves the Riccati equation of continuous time. The filter goes in steps: solve_discrete_are, and K = P C^T S^-1.",
+                    id="steady-continuous-rate",
+                ),
+                Mistake(
                     lambda A, C, Q, R: solve_continuous_are(A.T, C.T, Q, R) @ C.T @ np.linalg.inv(R),
                     "This solves the Riccati equation of continuous time. The filter goes in steps: solve_discrete_are, and K = P C^T S^-1.",
+                    id="steady_state_gain-d48c64",
                 ),
                 Mistake(
                     _rounds(5), "Five rounds are too few: repeat until the gain stands still, some thousand times."
@@ -2088,7 +2094,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [dy / r, -dx / r, -1]]),
-                    "The bearing changes by the shift across divided by the distance: divide by r squared, not by r.",
+                    "In the bearing's row dx and dy are divided by r squared, not by r: a shift across turns it by the shift over r, and dx over r is but the direction.",
+                    id="measurement_jacobian-8ef0d0",
                 ),
                 Mistake(
                     _rows(lambda dx, dy, r: [[-dx / r, -dy / r, 0], [dy / r**2, -dx / r**2, 1]]),
@@ -2603,6 +2610,11 @@ CHAPTER = Chapter(
                 Mistake(
                     lambda t, x, P: float(wrapped(t - x) @ np.linalg.solve(P, wrapped(t - x))),
                     "You wrapped all three differences. Only the heading is an angle: a position that is 5 m off stays 5 m off.",
+                ),
+                Mistake(
+                    lambda t, x, P: _error(t, x) @ np.linalg.solve(block_diag(P[:2, :2], P[2:, 2:]), _error(t, x)),
+                    "What position and heading share is left out: cov[:2, 2] counts as well. Invert the whole matrix.",
+                    id="nees-position-and-heading",
                 ),
                 Mistake(
                     lambda t, x, P: _error(t, x) @ P @ _error(t, x),

@@ -898,6 +898,16 @@ def recover(w_mean, w_slow, w_fast, alpha_slow, alpha_fast):
 # Wrong variants ------------------------------------------------------------------------------------------------------
 
 
+BEARING_ERRORS = {  # what is made of the difference of measured and expected bearing
+    True: planar.wrap_angle,
+    False: lambda difference: difference,
+    "positive": lambda difference: difference % (2 * math.pi),
+    "degrees": lambda difference: np.rad2deg(planar.wrap_angle(difference)),
+    "sine": np.sin,
+    "chord": lambda difference: 2 * np.sin(difference / 2),
+}
+
+
 def _landmarks(
     density=None,
     wrap=True,
@@ -917,21 +927,13 @@ def _landmarks(
     def variant(pose, z, landmarks, std_range, std_bearing):
         dx, dy = (pose[:2] - landmarks if back else landmarks - pose[:2]).T
         bearing = np.arctan2(dx, dy) if swap else np.arctan2(dy, dx)
+        difference = z[:, 1] - bearing + turn * pose[2]
         if wrap == "expected":
             error = z[:, 1] - planar.wrap_angle(bearing - pose[2])
-        elif wrap == "positive":
-            error = (z[:, 1] - bearing + pose[2]) % (2 * math.pi)
         elif wrap == "quotient":
-            error = std_bearing * planar.wrap_angle((z[:, 1] - bearing + pose[2]) / std_bearing)
-        elif wrap == "degrees":
-            error = np.rad2deg(planar.wrap_angle(z[:, 1] - bearing + pose[2]))
-        elif wrap == "sine":
-            error = np.sin(z[:, 1] - bearing + pose[2])
-        elif wrap == "chord":
-            error = 2 * np.sin((z[:, 1] - bearing + pose[2]) / 2)
+            error = std_bearing * planar.wrap_angle(difference / std_bearing)
         else:
-            error = z[:, 1] - bearing + turn * pose[2]
-            error = planar.wrap_angle(error) if wrap else error
+            error = BEARING_ERRORS[wrap](difference)
         stds = (std_range**2, std_bearing**2) if square else (std_range, std_bearing)
         stds = stds if exchanged is None else tuple(stds[k] for k in exchanged)
         terms = parts[0] * density(z[:, 0] - np.hypot(dx, dy), stds[0]) + parts[1] * density(error, stds[1])
@@ -2142,7 +2144,7 @@ def _catches(specimen, good, others, extra=()):
     return (
         rejects(specimen, sometimes),
         *(accepts(function) for function in good),
-        *(rejects(wrong, f"your test lets another wrong function pass, one that {words}.") for wrong, words in others),
+        *(rejects(wrong, f"your test also lets another one pass, which {words}.") for wrong, words in others),
     )
 
 
@@ -2681,7 +2683,7 @@ CHAPTER = Chapter(
                 Mistake(lambda l: float(np.logaddexp.reduce(l[np.isfinite(l)][:2])), "You summed the first two only."),
                 Mistake(
                     _around_the_mean,
-                    "What you took out (the mean, the first, the last?) may lie 1000 below the largest logarithm, and exp(1000) is infinite: take out the largest.",
+                    "What you took out (a mean, a median, the first, the last?) may lie 1000 below the largest logarithm, and exp(1000) is infinite: take out the largest.",
                     id="log_sum_exp-80675b",
                 ),
                 *(
@@ -2832,9 +2834,10 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         functools.partial(_ray_in_steps, cells=cells),
-                        "Your steps are longer than a cell is wide: they pass over corners and thin walls. Half a cell will do.",
+                        "Your steps are longer than a cell is wide: they pass over corners and thin walls. Take half a cell or less.",
+                        id=f"cast_ray-606eb4{which}",
                     )
-                    for cells in (1.5, 2, 2.5, 3, 4, 5, 10)
+                    for cells, which in zip((1.5, 2, 2.5, 3, 4, 5, 10), ("", "-2", "-3", "-4", "-5", "-6", "-7"))
                 ),
                 *(
                     Mistake(
@@ -3522,12 +3525,12 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a, w: float(planar.wrap_angle(w @ np.unwrap(a) / w.sum())),
-                    "Unrolled angles have an arithmetic mean, which is near where they are close together, but it is not the direction of the mean vector: average cosines and sines.",
+                    "A mean of unrolled angles, or of differences from one of them, is near the direction of the mean vector, but it is not that direction: average cosines and sines.",
                     id="circular_mean-394601",
                 ),
                 Mistake(
                     lambda a, w: float(planar.wrap_angle(a[0] + w @ planar.wrap_angle(a - a[0]) / w.sum())),
-                    "Unrolled angles have an arithmetic mean, which is near where they are close together, but it is not the direction of the mean vector: average cosines and sines.",
+                    "A mean of unrolled angles, or of differences from one of them, is near the direction of the mean vector, but it is not that direction: average cosines and sines.",
                     id="circular_mean-394601-2",
                 ),
                 Mistake(
