@@ -1,9 +1,13 @@
 """What a checked function sees besides its arguments: its own name, the notebook's data, the library's twin."""
 
+import __future__
+
+import ast
 import contextlib
 import copy
 import dis
 import functools
+import linecache
 import sys
 import types
 
@@ -27,15 +31,18 @@ def is_the_librarys(function, exercise, twins):
 
 @contextlib.contextmanager
 def own_name(function, name):
-    """While a function is judged, its name means the function: it may call itself, and is not judged with another."""
+    """While a function is judged, its name means the function: it may call itself, and is not judged with another. What
+    its cell defines further down is known as well: it is judged where it is defined, and called later on.
+    """
     known = getattr(function, "__globals__", None)
     if known is None or (function.__module__ or "").split(".")[0] == "labkit":
         yield
         return
     absent = object()
     names = {name, getattr(function, "__name__", name)} - {"<lambda>"}
-    before = {key: known.get(key, absent) for key in names}
-    known.update(dict.fromkeys(names, function))
+    meant = _defined_below(function) | dict.fromkeys(names, function)
+    before = {key: known.get(key, absent) for key in meant}
+    known.update(meant)
     try:
         yield
     finally:
@@ -44,6 +51,35 @@ def own_name(function, name):
                 known.pop(key, None)
             else:
                 known[key] = value
+
+
+def _defined_below(function):
+    """{name: function} of the plain functions that stand below a function in its cell, which has not got there yet."""
+    if not isinstance(function, types.FunctionType):
+        return {}
+    code, known = function.__code__, function.__globals__
+    try:
+        cell = ast.parse("".join(linecache.getlines(code.co_filename, known)))
+    except (SyntaxError, ValueError, RecursionError):  # a cell may hold what is no Python
+        return {}
+    below = [node for node in cell.body if _is_plain(node) and node.lineno > code.co_firstlineno]
+    below = [node for node in below if not _is_known(known.get(node.name), code.co_filename, node.lineno)]
+    found = {}
+    unread = __future__.annotations.compiler_flag  # annotations may be any code
+    exec(compile(ast.Module(below, []), code.co_filename, "exec", unread, True), known, found)
+    return found
+
+
+def _is_plain(node):
+    """Whether a statement defines a function and does nothing else: it runs no other code."""
+    if not isinstance(node, ast.FunctionDef) or node.decorator_list:
+        return False
+    return all(isinstance(value, ast.Constant | None) for value in (*node.args.defaults, *node.args.kw_defaults))
+
+
+def _is_known(value, file, line):
+    code = getattr(value, "__code__", None)
+    return code is not None and (code.co_filename, code.co_firstlineno) == (file, line)
 
 
 @contextlib.contextmanager

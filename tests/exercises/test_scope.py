@@ -4,6 +4,7 @@ import types
 
 import numpy as np
 import pytest
+from IPython.core.interactiveshell import InteractiveShell
 
 from labkit.chapters.ch02_chaining.exercises import CHAPTER as CHAINING
 from labkit.collect import border
@@ -34,6 +35,34 @@ def test_nobody_is_judged_with_the_reference_an_unsolved_cell_has_bound():
     outcome = CHAIN.judge(answer)
     assert outcome.status == RAISED and "calls itself again and again" in outcome.text
     assert answer.__globals__["chain"] is answer  # what the cell itself has defined
+
+
+HELPED = """
+@ex.chain
+def chain(transforms):
+    T = np.eye(4)
+    for link in transforms:
+        T = joined(T, link)
+    return T
+
+
+def joined(T, link, *, turned=False):
+    return T @ link
+
+
+def printing(text=print("run")): ...
+"""
+
+
+def test_a_function_may_call_one_that_its_cell_defines_further_down(capsys):
+    """A student who runs the cell again after a change below is judged with the changed function, too."""
+    shell, said = InteractiveShell(), []
+    shell.user_ns.update(ex=types.SimpleNamespace(chain=lambda f: said.append(CHAIN.judge(f)) or f), np=np)
+    for cell in (HELPED.replace("T @ link", "link @ T"), HELPED):
+        shell.run_cell(cell, silent=True)
+    assert [outcome.status for outcome in said] == [NOT_YET, CORRECT]
+    assert shell.user_ns["chain"].__globals__["joined"] is shell.user_ns["joined"]
+    assert capsys.readouterr().out == 2 * "run\n"  # nothing else in the cell runs twice
 
 
 def test_the_name_is_given_back_afterwards():

@@ -375,7 +375,21 @@ def close_to_the_rim(rng, step, share):
 
 
 JUST_WITHIN, JUST_OUTSIDE = (0.995, 0.999), (1.001, 1.005)
+
+
+def dogleg_in_a_long_valley(rng):
+    """A dogleg on its second leg in a valley ten thousand times as flat along as across."""
+    angle = rng.uniform(-np.pi, np.pi)
+    across = angle + np.deg2rad(rng.uniform(30, 60))
+    B, g = turned((rng.uniform(4e-4, 8e-4), rng.uniform(4, 8)), angle), np.array([np.cos(across), np.sin(across)])
+    return g, B, _radius_between(g, B, rng.uniform(0.2, 0.8))
+
+
 SPECIAL_DOGLEGS = (
+    (
+        dogleg_in_a_long_valley,
+        "right, but not where B is thousands of times as small along one direction as along another:",
+    ),
     (functools.partial(scaled_dogleg, size=1e-6), "right, but not for a radius near 1e-5:"),
     (functools.partial(scaled_dogleg, size=1e4), "right, but not for a radius in the ten thousands:"),
     (functools.partial(dogleg_along, of="B"), "right, but not where B is diagonal:"),

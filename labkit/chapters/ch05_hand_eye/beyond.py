@@ -83,6 +83,14 @@ def turned_poses(rng, n=None):
     return poses_that_see(T_FS, target, exp_so3(rng.uniform(-1.2, 1.2, (n, 3))), x_S), x_S, T_FS[:3, :3].copy()
 
 
+def hardly_turned(rng):
+    """Poses that turn by a degree or two, about all axes."""
+    T_FS, target = scanner(rng)
+    x_S = np.column_stack([rng.uniform(-25, 25, 6), rng.uniform(-20, 20, 6), rng.uniform(190, 290, 6)])
+    R_BF = exp_so3(rng.normal(size=3)) @ exp_so3(rng.uniform(-0.025, 0.025, (6, 3)))
+    return poses_that_see(T_FS, target, R_BF, x_S), x_S, T_FS[:3, :3].copy()
+
+
 def two_turned_alike(rng):
     """Four poses, the second and the third of one orientation: without the first or the last one nothing is determined."""
     while True:
@@ -1071,6 +1079,7 @@ LITERATURE = [
         fixed={"R_FS": ROTATION},
         metric=STEP_2,
         noisy=(
+            (hardly_turned, STEP_2, "right, but not for poses that turn by a degree or two, without noise:"),
             (two_turned_alike, STEP_2, "right, but not where two of four poses have one orientation:"),
             (
                 first_ones_turned_alike,

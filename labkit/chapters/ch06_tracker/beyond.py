@@ -255,6 +255,13 @@ def rays(rng, most):
     return origins, directions * rng.uniform(0.3, 4, (n, 1))
 
 
+def rays_nearly_parallel(rng):
+    """Four rays within a few degrees of one another, as from a station far away, that pass a point."""
+    place, far = rng.uniform(-500, 500, 3), unit_vector(rng.normal(size=3))
+    origins = place - 5000 * far + rng.uniform(-150, 150, (4, 3))
+    return origins, place - origins + rng.uniform(-3, 3, (4, 3))
+
+
 def many_rays(rng):
     """Thirty rays that pass a point."""
     place, origins = rng.uniform(-500, 500, 3), rng.uniform(-3000, 3000, (30, 3))
@@ -660,6 +667,11 @@ STATIONS = [
         draw=tuple(functools.partial(rays, most=most) for most in (6, 2, 3)),
         metric=metrics.Numbers(1e-6, "mm"),
         noisy=(
+            (
+                rays_nearly_parallel,
+                metrics.Numbers(1e-6, "mm"),
+                "right, but not for rays that lie within a few degrees of one another:",
+            ),
             (many_rays, metrics.Numbers(1e-6, "mm"), "right, but not for thirty rays:"),
             *(
                 (

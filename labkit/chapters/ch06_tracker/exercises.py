@@ -1361,6 +1361,11 @@ CHAPTER = Chapter(
                     "right where the axes differ, but not where they lie within a few degrees of one another:",
                 ),
                 (
+                    functools.partial(motions_about_axes_alike, within=0.015),
+                    metrics.Numbers(1e-6, "mm"),
+                    "right where the axes differ, but not where they lie within a degree of one another:",
+                ),
+                (
                     functools.partial(translation_problem, n=2),
                     metrics.Numbers(1e-6, "mm"),
                     "right, but not for two motions alone:",

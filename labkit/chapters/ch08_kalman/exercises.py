@@ -146,6 +146,13 @@ def steady_system(rng, n, m, sure=1.0):
     )
 
 
+def one_sensor_far_sharper(rng):
+    """The same where one sensor is forty times as exact as the other, and what enters is small beside both."""
+    A, C, cov_v, cov_z = steady_system(rng, n=2, m=2)
+    sharper = rng.permutation([1.0, 0.025])
+    return A, C, 1e-4 * cov_v, cov_z * np.outer(sharper, sharper)
+
+
 def forgetful_system(rng):
     """The same where a state is made anew at every step, of the others: A has no inverse."""
     A, C, cov_v, cov_z = steady_system(rng, n=3, m=2)
@@ -373,6 +380,17 @@ def surprise(rng, wanted, along=None, std=(0.3, 1.5), measure=np.linalg.solve, l
     return y * np.sqrt(rng.uniform(*wanted) * limit / (y @ measure(S, y))), S, limit
 
 
+def surprise_in_a_sure_direction(rng, wanted):
+    """An innovation in the direction in which S is smallest by far, as of two sensors that err together: who leaves weak
+    directions out lets it pass.
+    """
+    angle = rng.uniform(-np.pi, np.pi)
+    V = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    stds, limit = np.array([1.0, 0.02]) * rng.uniform(0.5, 2), rng.uniform(4.0, 9.0)
+    y = V @ (stds * np.sqrt(rng.uniform(*wanted) * limit * np.array([0.05, 0.95])) * rng.choice([-1, 1], 2))
+    return y, V @ np.diag(stds**2) @ V.T, limit
+
+
 def surprise_of(rng, m, wanted):
     """An innovation of m numbers with y' S^-1 y in this range of limits, its covariance, and a limit.
 
@@ -447,6 +465,7 @@ SURPRISES = (
     functools.partial(surprise, wanted=(0.75, 0.9), along=1, std=(300.0, 600.0), limit=(30.0, 60.0)),
     functools.partial(surprise, wanted=(1.1, 3.0), along=-1, std=(300.0, 600.0), limit=(30.0, 60.0)),
     no_surprise,
+    functools.partial(surprise_in_a_sure_direction, wanted=(1.5, 3.0)),
 )
 
 
@@ -1547,6 +1566,11 @@ CHAPTER = Chapter(
                     growing_system,
                     metrics.Numbers(1e-3),
                     "right, but not for a system of which a state grows by itself, by an eigenvalue of A above 1:",
+                ),
+                (
+                    one_sensor_far_sharper,
+                    metrics.Numbers(1e-3),
+                    "right for sensors of like quality, but not where one is forty times as exact as the other:",
                 ),
                 (
                     forgetful_system,

@@ -2144,7 +2144,7 @@ def _catches(specimen, good, others, extra=()):
     return (
         rejects(specimen, sometimes),
         *(accepts(function) for function in good),
-        *(rejects(wrong, f"your test also lets another one pass, which {words}.") for wrong, words in others),
+        *(rejects(wrong, f"your test catches the specimen, but not one that {words}.") for wrong, words in others),
     )
 
 
