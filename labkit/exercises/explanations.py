@@ -328,7 +328,7 @@ class Explanations(Named):
         shown = max(missed, key=lambda draw: _times_off(self._worst([draw[1:]])))
         example = self._example(*shown, len(missed) < len(pairs))
         own = isinstance(metric, metrics.Exactly) and type(metric).deviations is not metrics.Exactly.deviations
-        words = None if own else cases.result_words(pairs)
+        words = None if own else cases.result_words(pairs) or relations.both_parts_words(metric, pairs)
         if 0 < len(missed) < len(pairs) and (axes := relations.turned_axes(metric, [pair for _, *pair in missed])):
             words = f"{axes} where the result is wrong"
         told = closed(words or str(self._worst([shown[1:]]) if example else most))

@@ -146,6 +146,16 @@ def _pose_in_parts(metric, results, expected):
     return None
 
 
+def both_parts_words(metric, pairs):
+    """That rotation and translation of a pose are both off, and by how much at most; None where one is right."""
+    if not isinstance(metric, Poses):
+        return None
+    *turn, origin = (max(d, key=lambda d: d.amount) for d in zip(*(metric.deviations(*pair) for pair in pairs)))
+    if origin.within or turn[0].within or turn[0].unit != "deg":
+        return None
+    return f"rotation and translation are both off, by up to {turn[0].amount:.3g} deg and {origin.amount:.3g} {origin.unit}"
+
+
 def _rotation_kind(matrices, what):
     """What keeps matrices from being rotations, if anything does."""
     off = [np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).reshape(-1, 3, 3).max(axis=0, initial=0.0) for r in matrices]

@@ -319,13 +319,14 @@ class Search:
         return self._turned_words(("value", k, change, None) for k in truths for change in rerun.ALWAYS_THE_SAME)
 
     def _settled_words(self, line, mends):
-        """A condition further down that a change settles: where it mends as well that it always or never holds, nothing
-        is known of what it compares.
+        """A condition further down that a change settles, or a bound: where it mends as well that it always or never
+        holds, or is 0 or 1, nothing is known of what it compares.
         """
         if mends.endswith(("never happen", "always happen")):
             return None
         places, truths = self.written.places, sorted(self.written.of_truth)
         behind = [k for k in truths if places[k][0] > line and not self._is_fixed_truth(k)]
+        behind += [k for k, (at, text, *_) in enumerate(places) if at > line and BOUNDING.match(text)]
         return self._turned_words(("value", k, change, None) for k in behind for change in rerun.ALWAYS_THE_SAME)
 
     def _is_fixed_truth(self, k):
@@ -849,9 +850,16 @@ class Search:
             if result is None or np.isfinite(result).all() or _are_spoilt(case.args):
                 continue  # what was given is not what went wrong
             rounds = [(int(_spoilt(v).argmax()), k) for k, (n, v) in enumerate(values) if n and _spoilt(v).any()]
-            line, code, *_ = self.written.places[min(rounds)[1]]
+            made = [(at, k) for at, k in rounds if self._is_made_of_finite(k, at, values)]
+            line, code, *_ = self.written.places[min(made or rounds)[1]]
             return f"the first value on the way that is not finite is `{code}` in line {line}"
         return None
+
+    def _is_made_of_finite(self, k, at, values):
+        """Whether what goes into a value that is not finite, in a round, is finite, so that it arises there."""
+        _, code, name, _, first = self.written.places[k]
+        parts = [values[p] for p in range(first, k)]
+        return code != name and not any(n == values[k][0] and _spoilt(v)[at] for n, v in parts)
 
     def _is_step(self, k):
         """Whether a value is computed there: no argument, no name that is read, no constant."""

@@ -51,7 +51,7 @@ class Trial(Raised, Staying):
             as_they_came = "it as it came" if len(changed) == 1 else "them as they came"
             advice = INTO_SECOND if "arctan" in scope.co_names(self.function) else ""
             said = f"your function changes its {what} in place:"
-            told = f"{said} leave {as_they_came}, and change a copy, each time a new one"
+            told = f"{said} leave {as_they_came}, and change a fresh copy instead"
             return self.outcome(NOT_YET, f"{told}.{advice}")
         self.inputs.append(args)
         self.pairs.append((admitted[0], expected))

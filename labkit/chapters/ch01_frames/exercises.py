@@ -12,7 +12,7 @@ from ...exercises.engine import Chapter, Exercise, Prediction
 from ...exercises.outcome import Mistake
 from ...exercises.special import right_where
 from ...exercises.value import Value
-from ...geometry import frames
+from ...geometry import frames, lie
 from . import special
 
 
@@ -970,6 +970,11 @@ CHAPTER = Chapter(
                     lambda A, B: A @ B, "You multiplied T_WA by T_WB without inverting: in T_WA T_WB nothing cancels."
                 ),
                 Mistake(
+                    lambda A, B: lie.exp_se3(lie.log_se3(B) - lie.log_se3(A)),
+                    "This subtracts the logarithms of both poses, which is right of motions that commute alone. Invert T_WA, and multiply.",
+                    id="relative-logarithms",
+                ),
+                Mistake(
                     lambda A, B: frames.invert(A) @ frames.invert(B),
                     "This is T_AW T_BW: both are inverted, and nothing cancels. Only T_WA is turned round.",
                 ),
@@ -1423,7 +1428,7 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _undone(lambda R: np.arctan(R[1, 0] / R[0, 0]), _B_along),
-                    "The pose is right, but B leaves the range from -90 to 90 deg: the quotient r10/r00 loses the quadrant of A. Use np.arctan2(r10, r00).",
+                    "The pose is right, but where r00 is negative B leaves the range from -90 to 90 deg, and A is half a turn away. That comes of the quotient r10/r00, or where A is kept within 90 deg: A is np.arctan2(r10, r00) as it is, and B has a cosine above 0.",
                     id="kuka-quotient-undone",
                 ),
                 Mistake(

@@ -396,19 +396,19 @@ FILES = [
                 Mistake(
                     _written(f".{decimals}f"),
                     "A fixed number of decimals cuts off the last digits, all of them of a number that is small enough. Take 17 significant digits, "
-                    "as `.17g` does, or `repr`.",
+                    "as `.17g` does, or `repr(float(v))`.",
                     id=f"write-decimals-{decimals}",
                 )
                 for decimals in (10, 12, 16, 17, 18, 20)
             ),
             Mistake(
                 _written(".6f"),
-                "Six decimals, as the sheet prints them, lose the rest: what is read back is another number. Take 17 significant digits, or `repr`.",
+                "Six decimals, as the sheet prints them, lose the rest: what is read back is another number. Take 17 significant digits, or `repr(float(v))`.",
                 id="write-six",
             ),
             Mistake(
                 _written(".3f"),
-                "Three decimals look tidy and lose the rest. Take 17 significant digits, or `repr`.",
+                "Three decimals look tidy and lose the rest. Take 17 significant digits, or `repr(float(v))`.",
                 id="write-three",
             ),
             Mistake(
@@ -419,24 +419,24 @@ FILES = [
             *(
                 Mistake(
                     _written(form),
-                    f"{digits} significant digits are kept here, as by `{form}`: what is read back is another number. It takes 17, as `.16e` has them, or `repr`.",
+                    f"{digits} significant digits are kept here, as by `{form}`: what is read back is another number. It takes 17, as `.16e` has them, or `repr(float(v))`.",
                     id=f"write-{digits}-with-exponent",
                 )
                 for form, digits in (("e", 7), (".10e", 11), (".12e", 13))
             ),
             Mistake(
                 _written("g"),
-                "`g` keeps six significant digits, and so does `{v:g}`. Take 17, or `repr`.",
+                "`g` keeps six significant digits, and so does `{v:g}`. Take 17, or `repr(float(v))`.",
                 id="write-g",
             ),
             Mistake(
                 _written(".15g"),
-                "15 significant digits nearly suffice: 0.30000000000000004 comes back as 0.3. It takes 17, or `repr`.",
+                "15 significant digits nearly suffice: 0.30000000000000004 comes back as 0.3. It takes 17, or `repr(float(v))`.",
                 id="write-fifteen",
             ),
             Mistake(
                 _written(".16g"),
-                "16 significant digits suffice for many numbers, not for all. It takes 17, or `repr`.",
+                "16 significant digits suffice for many numbers, not for all. It takes 17, or `repr(float(v))`.",
                 id="write-sixteen",
             ),
             Mistake(
@@ -456,7 +456,7 @@ FILES = [
             ),
             Mistake(
                 _written(".15f"),
-                "15 places after the point are too few for a small number: its digits begin later. Take 17 significant digits, or `repr`.",
+                "15 places after the point are too few for a small number: its digits begin later. Take 17 significant digits, or `repr(float(v))`.",
                 id="write-fifteen-places",
             ),
             Mistake(

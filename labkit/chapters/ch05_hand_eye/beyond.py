@@ -269,8 +269,7 @@ def _spread_of(l):
 
 def marks_with(name, turn_deg=180.0, change=lambda T: T):
     """The way between both marks of the notebook's gauge (mm) with some pose of the scanner, the flange turned in between."""
-    measured = thesis.measurements(True)
-    truth = hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S).T_FS
+    truth = _true_pose()
     T_BF, x_S = robot_accuracy.looking_down_at(GAUGE, truth, np.deg2rad([0.0, turn_deg]))
     T_FS = change(truth if name == "calibrated" else thesis.frame(name))
     p, q = frames.transform(T_BF, frames.transform(T_FS, x_S))
@@ -282,20 +281,31 @@ def length_with(*args, **kwargs):
     return float(np.linalg.norm(marks_with(*args, **kwargs)))
 
 
+def _true_pose():
+    """The scanner's pose on the flange, calibrated."""
+    measured = thesis.measurements(True)
+    return hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S).T_FS
+
+
+def _found_with_cad():
+    """Both marks of the gauge (mm) as the CAD pose gives them, the flange turned by half a turn in between."""
+    T_BF, x_S = robot_accuracy.looking_down_at(GAUGE, _true_pose(), np.deg2rad([0.0, 180.0]))
+    return frames.transform(T_BF, frames.transform(thesis.frame("scanner_start"), x_S))
+
+
+def one_end(k):
+    """How far one mark, measured with the CAD pose, is from where the other one is, mm."""
+    return float(np.linalg.norm(_found_with_cad()[k] - GAUGE[1 - k]))
+
+
 def cad_offset():
     """How far the CAD pose is off the calibrated one, mm."""
-    measured = thesis.measurements(True)
-    truth = hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S).T_FS
-    return float(np.linalg.norm(truth[:3, 3] - thesis.frame("scanner_start")[:3, 3]))
+    return float(np.linalg.norm(_true_pose()[:3, 3] - thesis.frame("scanner_start")[:3, 3]))
 
 
 def place_error():
     """How far a mark comes out from its true place with the CAD pose, mm: both by as much."""
-    measured = thesis.measurements(True)
-    truth = hand_eye.calibrate_sphere_target(measured.T_BF, measured.x_S).T_FS
-    T_BF, x_S = robot_accuracy.looking_down_at(GAUGE, truth, np.deg2rad([0.0, 180.0]))
-    found = frames.transform(T_BF, frames.transform(thesis.frame("scanner_start"), x_S))
-    return float(np.linalg.norm(found[0] - GAUGE[0]))
+    return float(np.linalg.norm(_found_with_cad()[0] - GAUGE[0]))
 
 
 def _height(change):
@@ -649,6 +659,14 @@ CAD_LENGTH = Value(
             lambda: length_with("scanner_start") - 100.0,
             "This is by how much the length is wrong. Asked for is the length.",
             id="length-difference",
+        ),
+        *(
+            Mistake(
+                lambda k=k: one_end(k),
+                "One end of this is the mark as it is, from `marks`, the other one as it is measured. Take both as the CAD pose measures them.",
+                id=f"length-one-end-{k}",
+            )
+            for k in (0, 1)
         ),
         Mistake(
             place_error,

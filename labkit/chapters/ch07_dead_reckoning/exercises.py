@@ -771,10 +771,13 @@ def _in_one_step():
 
 
 @functools.cache
-def _loop(step=propagate, steps=None, again=0, start_cov=0.0, at_the_end=False, noise_time=None, **noise):
-    """The loop over the circle with another step, fewer or more steps, another start or other constants of the noise."""
+def _loop(step=propagate, steps=None, again=0, start_cov=0.0, at_the_end=False, noise_time=None, turns=0.0, **noise):
+    """The loop over the circle with another step, fewer or more steps, another start or other constants of the noise; turns: so
+    many turns of a step before the start.
+    """
     drive = lecture.circle_drive()
-    x, cov = _circle()[0] if at_the_end else np.zeros(3), start_cov * np.eye(3)
+    ahead = np.array([0.0, 0.0, turns * drive.controls[0, 1] * drive.dt])
+    x, cov = _circle()[0] if at_the_end else ahead, start_cov * np.eye(3)
     for u in [*drive.controls[:steps], *drive.controls[:again]]:
         cov_u = odometry.control_covariance(u, noise_time or drive.dt, **(drive.noise | noise))
         x, cov = step(x, cov, u, drive.dt, cov_u)
@@ -1722,6 +1725,22 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _covariance(
+                        lambda v, w, t, a, b, c: a * v**2 / t,
+                        lambda v, w, t, a, b, c: (b * abs(w) + c * v**2) / t,
+                    ),
+                    "The speed is squared here. Its variances grow with the way, |v| T, not with its square.",
+                    id="control-speed-squared",
+                ),
+                Mistake(
+                    _covariance(
+                        lambda v, w, t, a, b, c: a * v**2 / t,
+                        lambda v, w, t, a, b, c: (b * w**2 + c * v**2) / t,
+                    ),
+                    "Speed and turn rate are squared here. The variances grow with the way, |v| T, and the turn, |omega| T, not with their squares.",
+                    id="control-both-squared",
+                ),
+                Mistake(
+                    _covariance(
                         lambda v, w, t, a, b, c: a * abs(v) / t**2,
                         lambda v, w, t, a, b, c: (b * abs(w) + c * abs(v)) / t**2,
                     ),
@@ -1991,6 +2010,15 @@ CHAPTER = Chapter(
                     _without_carrying,
                     "Here the noise of the steps is added up, no more. Earlier heading errors also move all later positions: F_x cov F_x^T.",
                     id="end_cov-53000c",
+                ),
+                *(
+                    Mistake(
+                        lambda turns=turns: _loop(turns=turns)[1],
+                        "The ellipse has its size, and is turned: the drive begins with another heading, or each step takes its Jacobians at another. Start at (0, 0, 0), and "
+                        "take them at the old pose.",
+                        id=f"end-cov-turned-{turns:g}",
+                    )
+                    for turns in (0.5, 1.0, -0.5)
                 ),
                 Mistake(
                     _in_one_step,

@@ -3525,12 +3525,12 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     lambda a, w: float(planar.wrap_angle(w @ np.unwrap(a) / w.sum())),
-                    "A mean of unrolled angles, or of differences from one of them, is near the direction of the mean vector, but it is not that direction: average cosines and sines.",
+                    "A mean of unrolled angles, or of differences from one of them, is not the direction of the mean vector, though near it for angles that lie close together: average cosines and sines.",
                     id="circular_mean-394601",
                 ),
                 Mistake(
                     lambda a, w: float(planar.wrap_angle(a[0] + w @ planar.wrap_angle(a - a[0]) / w.sum())),
-                    "A mean of unrolled angles, or of differences from one of them, is near the direction of the mean vector, but it is not that direction: average cosines and sines.",
+                    "A mean of unrolled angles, or of differences from one of them, is not the direction of the mean vector, though near it for angles that lie close together: average cosines and sines.",
                     id="circular_mean-394601-2",
                 ),
                 Mistake(
