@@ -153,7 +153,8 @@ def both_parts_words(metric, pairs):
     *turn, origin = (max(d, key=lambda d: d.amount) for d in zip(*(metric.deviations(*pair) for pair in pairs)))
     if origin.within or turn[0].within or turn[0].unit != "deg":
         return None
-    return f"rotation and translation are both off, by up to {turn[0].amount:.3g} deg and {origin.amount:.3g} {origin.unit}"
+    by = f"{turn[0].amount:.3g} deg and {origin.amount:.3g} {origin.unit}"
+    return f"rotation and translation are both off, by up to {by}"
 
 
 def _rotation_kind(matrices, what):

@@ -293,9 +293,9 @@ def _found_with_cad():
     return frames.transform(T_BF, frames.transform(thesis.frame("scanner_start"), x_S))
 
 
-def one_end(k):
-    """How far one mark, measured with the CAD pose, is from where the other one is, mm."""
-    return float(np.linalg.norm(_found_with_cad()[k] - GAUGE[1 - k]))
+def one_end():
+    """How far one mark, measured with the CAD pose, is from where the other one is, mm: either as far."""
+    return float(np.linalg.norm(_found_with_cad()[0] - GAUGE[1]))
 
 
 def cad_offset():
@@ -660,13 +660,10 @@ CAD_LENGTH = Value(
             "This is by how much the length is wrong. Asked for is the length.",
             id="length-difference",
         ),
-        *(
-            Mistake(
-                lambda k=k: one_end(k),
-                "One end of this is the mark as it is, from `marks`, the other one as it is measured. Take both as the CAD pose measures them.",
-                id=f"length-one-end-{k}",
-            )
-            for k in (0, 1)
+        Mistake(
+            one_end,
+            "One end of this is the mark as it is, from `marks`, the other one as it is measured. Take both as the CAD pose measures them.",
+            id="length-one-end",
         ),
         Mistake(
             place_error,

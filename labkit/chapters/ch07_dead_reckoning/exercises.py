@@ -1733,14 +1733,6 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _covariance(
-                        lambda v, w, t, a, b, c: a * v**2 / t,
-                        lambda v, w, t, a, b, c: (b * w**2 + c * v**2) / t,
-                    ),
-                    "Speed and turn rate are squared here. The variances grow with the way, |v| T, and the turn, |omega| T, not with their squares.",
-                    id="control-both-squared",
-                ),
-                Mistake(
-                    _covariance(
                         lambda v, w, t, a, b, c: a * abs(v) / t**2,
                         lambda v, w, t, a, b, c: (b * abs(w) + c * abs(v)) / t**2,
                     ),
@@ -2018,7 +2010,7 @@ CHAPTER = Chapter(
                         "take them at the old pose.",
                         id=f"end-cov-turned-{turns:g}",
                     )
-                    for turns in (0.5, 1.0, -0.5)
+                    for turns in (0.5, -0.5)
                 ),
                 Mistake(
                     _in_one_step,
