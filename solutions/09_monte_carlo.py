@@ -173,8 +173,8 @@ def log_sum_exp(log_weights):
 # %% cast_ray
 @ex.cast_ray
 def cast_ray(grid, pose, bearing, r_max):
-    """Return the distance (m) to the first occupied cell along a beam, r_max if none is
-    nearer.
+    """Return the distance (m) to the first occupied cell along a beam, right to half a
+    cell; r_max if none is nearer. A corner cut by less may be passed over.
 
     grid.at([x, y]) is maps.OCCUPIED there; maps.FREE and maps.UNKNOWN, as all is beyond
     the map, do not stop it. A cell is grid.resolution wide (m).

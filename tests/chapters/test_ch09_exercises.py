@@ -447,7 +447,7 @@ def walked(first, step, share=1.0, more=0.0):
 
 def in_steps_of_five_centimeters(grid, pose, bearing, r_max):
     """What is half a cell in the building is returned for half a cell of every map."""
-    return in_steps_of_a_cell(grid, pose, bearing, r_max) / grid.resolution * 0.1
+    return walked(0.0, None)(grid, pose, bearing, r_max) / grid.resolution * 0.1
 
 
 def one_astray(x, u, dt, std_u, rng):

@@ -1029,6 +1029,19 @@ CHAPTER = Chapter(
                     lambda: np.rad2deg(np.arccos(np.trace(_K0_T_K1()[:3, :3]) - 1)),
                     "The half is missing: trace(R) = 1 + 2 cos(angle).",
                 ),
+                *(
+                    Mistake(
+                        lambda cosine=cosine: 2 * np.rad2deg(np.arccos(cosine(np.trace(_K0_T_K1())))),
+                        "Twice an arccosine is the angle of a quaternion, of which w = cos(angle / 2) = sqrt(1 + trace(R)) / 2, with the trace of "
+                        "the 3x3 block. Yours has another trace, or no root.",
+                        id=f"angle-quaternion-{name}",
+                    )
+                    for name, cosine in (
+                        ("no-root", lambda trace: (trace - 1) / 4),
+                        ("no-root-4x4", lambda trace: trace / 4),
+                        ("4x4", lambda trace: np.sqrt((1 + trace) / 4)),
+                    )
+                ),
                 Mistake(
                     lambda: np.rad2deg(np.arccos(np.trace(_K0_T_K1()[:3, :3]) / 3)),
                     "This takes a third of the trace for the cosine. trace(R) = 1 + 2 cos(angle): take 1 off, then half of it.",

@@ -761,6 +761,16 @@ def _repeated_entry(k):
     return variant
 
 
+def _arrives(x):
+    """Whether a few of Newton's steps from a place end in the saddle, which is near it all the way."""
+    saddle, x = wells.extrema()[2].x, np.array(x, dtype=float)
+    for _ in range(FEW):
+        if np.linalg.norm(x - saddle) > WITHIN_REACH:
+            return False
+        x = x + opt.newton_step(wells.gradient(x), wells.hessian(x))
+    return bool(np.linalg.norm(x - saddle) < 1e-6)
+
+
 def _slope_there(x):
     """Whether a place is stationary, and of which kind, as a sentence."""
     slope, bends = np.linalg.norm(wells.gradient(x)), np.linalg.eigvalsh(wells.hessian(x))
@@ -768,8 +778,7 @@ def _slope_there(x):
         return "There f is nearly flat, far out on the plain, where the gradient fades and vanishes nowhere: start between the wells"
     if bends.min() > 0 and slope < NEXT_TO * bends.min():
         return "That is a minimum, or within a hundredth of one: f bends up there in all directions"
-    near = np.linalg.norm(x - wells.extrema()[2].x) < WITHIN_REACH
-    further = ", and one is near: a few of Newton's steps from there end in it" if near else ""
+    further = ", and one is near: a few of Newton's steps from there end in it" if _arrives(x) else ""
     return f"There the gradient is {slope:.3g} long. At a saddle it vanishes{further}"
 
 
@@ -781,7 +790,7 @@ def _equal_depths():
 
 
 FLAT, NEXT_TO = 1.0, 1e-2  # curvature that is next to nothing; how far off a minimum may be that is told as such
-WITHIN_REACH = 0.05  # of the saddle, from where Newton's steps end in it
+WITHIN_REACH, FEW = 0.3, 6  # of the saddle, where it is called near; Newton's steps that are a few
 NOT_DOWNHILL = "A search downhill ends in a well, and so do Newton's steps from a start near it. They end in the saddle from a start near the pass between the wells."
 
 

@@ -210,7 +210,7 @@ def plain_ray(rng, way=None):
             right = casts[0, 2]
             steps = _hits(grid, pose, b, R_MAX, grid.resolution / 2)
             stepped = steps.min(initial=R_MAX)  # half a cell at a time: a wall's corner is easily stepped over
-            if steps.max(initial=0.0) > right + 1.0 and abs(stepped - right) <= grid.resolution:
+            if steps.max(initial=0.0) > right + 1.0 and abs(stepped - right) <= grid.resolution / 2:
                 return grid, pose, float(b), R_MAX
 
 
@@ -650,11 +650,14 @@ class Reach(metrics.Numbers):
         return [replace(off, words=f"your result is {off.amount:.3g} m {more} than {way}")]
 
 
+HALF_A_CELL = Reach(0.055, "m", absolute=True)  # of maps with cells of 10 cm
+
+
 def right_however_far(student, rng):
     """A property of `cast_ray`: right on a ray over thousands of cells, too; not asked of one that takes its time, nor
     of one that fails there, as one may that is tried with a change, and with a limit to its steps.
     """
-    began, far, metric = seconds(), ray_over_thousands_of_cells(rng), Reach(0.16, "m", absolute=True)
+    began, far, metric = seconds(), ray_over_thousands_of_cells(rng), HALF_A_CELL
     student(*ray_down_a_hall(rng))
     if FAR_TIMES * (seconds() - began) > LONGEST:
         return None
@@ -2700,75 +2703,75 @@ CHAPTER = Chapter(
             reference=maps.walk_ray,
             draw=(*EVERY_WAY, ray_past_the_unknown),
             fixed={"pose": POSE},
-            metric=Reach(0.16, "m", absolute=True),
+            metric=HALF_A_CELL,
             noisy=[
                 (
                     short_ray,
-                    Reach(0.16, "m", absolute=True),
+                    HALF_A_CELL,
                     "Right on rays to a wall with r_max = 18 m, but not on one that ends at r_max, some 30 cm before a wall:",
                 ),
                 (
                     ray_that_ends_just_before,
-                    Reach(0.06, "m", absolute=True),
+                    HALF_A_CELL,
                     "Right on other rays, but not on one that ends at r_max, nearly a cell before a wall (does yours look beyond r_max?):",
                 ),
                 (
                     ray_to_a_thin_wall,
-                    Reach(0.16, "m", absolute=True),
+                    HALF_A_CELL,
                     "Right on other rays, but not on one nearly along y to a wall of one cell (is a step longer than a cell, or does it "
                     "get longer there?):",
                 ),
                 (
                     ray_that_just_arrives,
-                    Reach(0.16, "m", absolute=True),
+                    HALF_A_CELL,
                     "Right on other rays, but not on one that meets a wall a little before r_max:",
                 ),
                 (
                     ray_to_a_wall_close_by,
-                    Reach(0.16, "m", absolute=True),
+                    HALF_A_CELL,
                     "Right on longer rays, but not on one to a wall some 20 cm away (does yours begin farther out?):",
                 ),
                 *(
                     (
                         functools.partial(ray_along_an_axis, toward=toward),
-                        Reach(0.16, "m", absolute=True),
+                        HALF_A_CELL,
                         f"Right on other rays, but not on one straight {against} on a map that begins elsewhere than at (0, 0):",
                     )
                     for toward, against in ((math.pi, "against x"), (-math.pi / 2, "against y"), (0.0, "along x"))
                 ),
                 (
                     ray_in_a_fine_map,
-                    Reach(0.05, "m", absolute=True),
+                    Reach(0.011, "m", absolute=True),
                     "right, but not on a map with cells of 2 cm and a wall of one cell (is the length of a step typed in? "
                     "grid.resolution is the width of a cell):",
                 ),
                 (
                     ray_down_a_hall,
-                    Reach(0.64, "m", absolute=True),
+                    Reach(0.22, "m", absolute=True),
                     "Right on shorter rays, but not on one to a wall some 60 m away, in cells of 40 cm, that r_max = 75 m reaches (does yours end "
                     "sooner?):",
                 ),
                 (
                     ray_by_a_far_sighted_scanner,
-                    Reach(0.16, "m", absolute=True),
+                    HALF_A_CELL,
                     "Right with an r_max of some dozens of meters, but not with one of about 200 m, on a ray to a wall of one cell (is the "
                     "number of steps typed in? However far r_max is, a step is to be shorter than a cell):",
                 ),
                 (
                     ray_from_within_a_wall,
-                    Reach(0.16, "m", absolute=True),
+                    HALF_A_CELL,
                     "Right on other rays, but not on one that begins deep in a wall, where the first occupied cell is its own:",
                 ),
                 (
                     ray_that_leaves_the_map,
-                    Reach(0.16, "m", absolute=True),
+                    HALF_A_CELL,
                     "Right on other rays, but not on one that leaves the map before it meets anything: no cell is occupied there, and "
                     "grid.at says so:",
                 ),
             ],
             properties=(right_however_far,),
             hints=(
-                "Walk along the ray in steps smaller than a cell, and stop in the first occupied one.",
+                "Walk along the ray in steps of half a cell or less, and stop in the first occupied one.",
                 "The direction is theta + bearing. Walk along it in steps of half a cell: grid.at([x, y]) says what is there, and the first maps.OCCUPIED ends the beam. If none comes, r_max.",
                 "`a = pose[2] + bearing\n"
                 "r = np.arange(0, r_max, grid.resolution / 2)\n"
@@ -3787,7 +3790,8 @@ CHAPTER = Chapter(
                 ),
                 Mistake(
                     _depth(angle=lambda u, fov: u * fov / 2),
-                    "Columns are evenly spaced on the picture, not in angle: the arctangent is missing.",
+                    "Columns are evenly spaced on the picture, not in angle: a bearing is the arctangent of the place on the picture, which reaches from tan(field_of_view / 2) on the left to minus that.",
+                    id="scan_from_depth-469b65",
                 ),
                 Mistake(
                     _evenly_from_edge_to_edge,

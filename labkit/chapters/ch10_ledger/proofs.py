@@ -279,6 +279,12 @@ BOUND = Exercise(
             "The root of the sum of squares is for random errors. A bound must hold in the worst case: add all moves.",
         ),
         Mistake(
+            lambda f, p: np.sqrt((_larger(f, p) ** 2).sum() / 3),
+            "A move over the root of 3, added as squares, is a standard deviation, of numbers that lie evenly within their "
+            "half unit. A bound must hold in the worst case: add all moves.",
+            id="bound-standard-deviation",
+        ),
+        Mistake(
             lambda f, p: abs(sum(_moves(f, p)[0])),
             "You added the moves with their signs, so that they cancel: take the absolute value of each first.",
         ),
