@@ -228,7 +228,7 @@ def test_a_step_need_not_go_straight_down(seed):
         (wells.extrema()[0].x + 1e-8, "That is a minimum, or within a hundredth of one"),
         (wells.extrema()[1].x - 1e-5, "That is a minimum, or within a hundredth of one"),
         (np.array([3e4, -2e4]), "far out on the plain"),
-        (np.array([0.0, 0.0]), "There the gradient is 11.1 long. At a saddle it vanishes."),
+        (np.array([0.0, 0.0]), "There the gradient is 11.1 long. At a saddle it vanishes, and one is near"),
         (np.array([0.16, -0.26]), "and one is near: a few of Newton's steps from there end in it."),
         (np.array([-0.16904684, -0.75357026]), "t runs from (1, 1) to (−1, −2)"),
         (wells.extrema()[1].x, "A search downhill ends in a well"),

@@ -1039,7 +1039,6 @@ CHAPTER = Chapter(
                     for name, cosine in (
                         ("no-root", lambda trace: (trace - 1) / 4),
                         ("no-root-4x4", lambda trace: trace / 4),
-                        ("4x4", lambda trace: np.sqrt((1 + trace) / 4)),
                     )
                 ),
                 Mistake(

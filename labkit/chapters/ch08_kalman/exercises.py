@@ -1634,11 +1634,6 @@ CHAPTER = Chapter(
                     "Not cov_z alone is divided by: the covariance before the correction goes with S = C cov C^T + cov_z.",
                 ),
                 Mistake(
-                    lambda A, C, Q, R: _gain(solve_discrete_are(A, C.T, Q, R), C, R),
-                    "A stands on the wrong side: the covariance is predicted by A cov A^T. A^T cov A, the equation of the control engineers, wants A^T handed in for A.",
-                    id="steady-other-side",
-                ),
-                Mistake(
                     lambda A, C, Q, R: A @ kalman.steady_state(A, C, Q, R).gain,
                     "This is A K, the gain of the form that predicts and corrects in one line. Here the correction's own gain is asked for.",
                 ),

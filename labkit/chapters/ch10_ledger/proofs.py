@@ -280,8 +280,8 @@ BOUND = Exercise(
         ),
         Mistake(
             lambda f, p: np.sqrt((_larger(f, p) ** 2).sum() / 3),
-            "A move over the root of 3, added as squares, is a standard deviation, of numbers that lie evenly within their "
-            "half unit. A bound must hold in the worst case: add all moves.",
+            "A move over the root of 3, added as squares, is a standard deviation, of numbers that lie evenly within "
+            "their half unit. A bound must hold in the worst case: add all moves.",
             id="bound-standard-deviation",
         ),
         Mistake(
