@@ -13,8 +13,9 @@ from .results import Refusal, admitted_by, is_another, numbers_of, same_numbers
 
 REPEATING = 0.02  # seconds of processor time in which an answer that came out right is called again
 IN_A_ROW = 8  # times that a draw is called then, of each of ...
-TURNS = 10  # of draws in which each argument is exchanged: of one the result may hang little, or not at all
-PARTS = 2  # of these, in which only a part of it is
+TURNS = 11  # of draws in which each argument is exchanged: of one the result may hang little, or not at all
+PARTS = ("that is the same in a part", "that is the same in a part", "that differs by hundred-thousandths")  # the last
+NEARLY = 1e-5  # by which an argument may differ and be the same when it is rounded
 ALIKE = 3  # kinds of results at most, where they are words or truth values
 UNFILLED = {"empty", "empty_like"}  # what makes arrays that hold whatever stood there before
 
@@ -127,7 +128,7 @@ class Staying(Evidence):
             args, other = (exercise.cases[(turn + k + more) % len(exercise.cases)](rng) for more in (0, turn % 2))
             if not kind.left() or k >= min(len(args), len(other)) or type(args[k]) is not type(other[k]):
                 continue
-            parts = turn - TURNS + PARTS
+            parts = turn - TURNS + len(PARTS)
             before = other[k] if parts < 0 else partly_alike(args[k], other[k], parts)
             expected = exercise.reference(*copy.deepcopy(args))
             admitted = functools.partial(admitted_by, exercise.metric, expected)
@@ -138,11 +139,11 @@ class Staying(Evidence):
             as_then = same_numbers(numbers_of(run.result), numbers_of(before.result))
             if as_then or self._is_right_on(self.defaults.fresh, args, exercise.metric, expected):
                 told = "returns what it returned then" if as_then else "is no longer right"
-                another = f"another `{name}`" + (" that is the same in a part" if parts >= 0 else "")
+                another = f"another `{name}`" + (f" {PARTS[parts]}" if parts >= 0 else "")
                 rest = " and all else as before" if len(args) > 1 else ""
                 return (
                     f"right at first, but called again with {another}{rest}, your function "
-                    f"{told}: is a result kept under a key that leaves a part of the arguments out?"
+                    f"{told}: is a result kept under a key that leaves a part of the arguments out, or rounds it?"
                     f"{self._about_globals()}"
                 )
         return None
@@ -150,8 +151,11 @@ class Staying(Evidence):
 
 def partly_alike(value, other, part):
     """Another value of an argument that is this one in a part: bytes or arrays in their first half (part 0) or second
-    (part 1), poses (..., 4, 4) in their rotation (0) or translation (1).
+    (part 1), poses (..., 4, 4) in their rotation (0) or translation (1); or one that is nearly the same (part 2).
     """
+    if part == 2:
+        is_float = isinstance(value, float) or isinstance(value, np.ndarray) and value.dtype.kind == "f"
+        return value + NEARLY if is_float else other
     if isinstance(value, bytes):
         half = len(value) // 2
         return other[:half] + value[half:] if part else value[:half] + other[half:]

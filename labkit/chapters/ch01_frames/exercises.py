@@ -108,12 +108,25 @@ def edges_on_axes(rng):
     return lengths[0] * np.eye(3)[one], lengths[1] * np.eye(3)[other]
 
 
+def edges_nearly_on_axes(rng):
+    """The same edges, turned by less than a thousandth: small entries count."""
+    turn = Rotation.from_rotvec(rng.uniform(3e-4, 9e-4) * frames.unit_vector(rng.normal(size=3)))
+    return tuple(turn.apply(edge) for edge in edges_on_axes(rng))
+
+
+def points_nearly_on_axes(rng):
+    """Three points whose edges are that."""
+    origin = rng.uniform(-500, 500, 3)
+    return origin, *(origin + edge for edge in edges_nearly_on_axes(rng))
+
+
 def points_on_axes(rng):
     """The same edges, from the origin of W."""
     return np.zeros(3), *edges_on_axes(rng)
 
 
 NEARLY_SQUARE = "that are nearly perpendicular, where the shadow is small but not 0:"
+NEARLY_ON_AXES = "right, but not nearly along the axes of W, turned by less than a thousandth:"
 ON_AXES = "right, but not along the axes of W, where products are exactly 0:"
 
 
@@ -679,6 +692,7 @@ CHAPTER = Chapter(
             metric=metrics.Rotations(1e-7),
             noisy=[
                 (edges_on_axes, metrics.Rotations(1e-7), ON_AXES),
+                (edges_nearly_on_axes, metrics.Rotations(1e-7), NEARLY_ON_AXES),
                 (nearly_at_right_angles, metrics.Rotations(1e-7), f"right, but not for short edges {NEARLY_SQUARE}"),
             ],
             properties=(
@@ -782,6 +796,7 @@ CHAPTER = Chapter(
             metric=metrics.Poses(1e-6, 1e-6),
             noisy=[
                 (points_on_axes, metrics.Poses(1e-6, 1e-6), ON_AXES),
+                (points_nearly_on_axes, metrics.Poses(1e-6, 1e-6), NEARLY_ON_AXES),
                 (nearly_square_points, metrics.Poses(1e-6, 1e-6), f"right, but not for edges {NEARLY_SQUARE}"),
             ],
             properties=(right_where(frames.frame_from_points, metrics.Poses(1e-6, 1e-6), *special.TRIANGLES),),

@@ -2340,7 +2340,7 @@ CHAPTER = Chapter(
         Exercise(
             "ekf_step",
             reference=ekf_step,
-            sizes=("cov", "u", "dt", "cov_u", "cov_z"),
+            sizes=("cov", "cov_u", "cov_z"),
             draw=(
                 filter_step,
                 functools.partial(filter_step, ahead=-1, side=-1),
