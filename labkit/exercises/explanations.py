@@ -346,6 +346,8 @@ class Explanations(Named):
         )
         named = None if special or near else self._named_elsewhere()
         asked = f". Where it is wrong: {named}" if named else asked
+        if isinstance(metric, metrics.Exactly) and len(pairs) > 2 and are_one([result for result, _ in pairs]):
+            told = f"it is {shown_whole(pairs[0][0])} on every draw. {told[0].upper()}{told[1:]}"
         right = special or f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws{asked}"
         return f"{told} {right}{example}"
 

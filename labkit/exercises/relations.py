@@ -376,8 +376,8 @@ def _a_factor_of_each_draw(results, expected):
     if np.allclose(np.abs(ratios), 1, rtol=EXACT, atol=0):
         return "your result is the expected one, but its sign is turned on some draws" if max(ratios) > 0 else None
     return (
-        "your result is the expected one times a number that is not the same on every draw: is it to be divided by "
-        "another one, its sum or its length, say?"
+        "your result is the expected one times a number that is not the same on every draw: look at what it is "
+        "multiplied or divided by"
     )
 
 

@@ -13,9 +13,9 @@ from .results import Refusal, admitted_by, is_another, numbers_of, same_numbers
 
 REPEATING = 0.02  # seconds of processor time in which an answer that came out right is called again
 IN_A_ROW = 8  # times that a draw is called then, of each of ...
-TURNS = 11  # of draws in which each argument is exchanged: of one the result may hang little, or not at all
-PARTS = ("that is the same in a part", "that is the same in a part", "that differs by hundred-thousandths")  # the last
-NEARLY = 1e-5  # by which an argument may differ and be the same when it is rounded
+TURNS = 12  # of draws in which each argument is exchanged: of one the result may hang little, or not at all
+PARTS = 2 * ("that is the same in a part",) + 2 * ("that is nearly the same",)  # the last of them
+NEARLY = 1e-5, 1e-7  # by which an argument may differ and be the same when it is rounded
 ALIKE = 3  # kinds of results at most, where they are words or truth values
 UNFILLED = {"empty", "empty_like"}  # what makes arrays that hold whatever stood there before
 
@@ -151,11 +151,11 @@ class Staying(Evidence):
 
 def partly_alike(value, other, part):
     """Another value of an argument that is this one in a part: bytes or arrays in their first half (part 0) or second
-    (part 1), poses (..., 4, 4) in their rotation (0) or translation (1); or one that is nearly the same (part 2).
+    (part 1), poses (..., 4, 4) in their rotation (0) or translation (1); or one that is nearly the same (parts 2, 3).
     """
-    if part == 2:
+    if part > 1:
         is_float = isinstance(value, float) or isinstance(value, np.ndarray) and value.dtype.kind == "f"
-        return value + NEARLY if is_float else other
+        return value + NEARLY[part - 2] if is_float else other
     if isinstance(value, bytes):
         half = len(value) // 2
         return other[:half] + value[half:] if part else value[:half] + other[half:]

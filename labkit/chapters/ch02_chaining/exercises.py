@@ -11,7 +11,7 @@ from ...exercises.outcome import Mistake
 from ...exercises.special import right_where
 from ...exercises.value import Value
 from ...geometry import chaining, frames
-from ...geometry.lie import exp_se3, log_se3, nearest_rotation
+from ...geometry.lie import exp_se3, exp_so3, log_se3, nearest_rotation
 from . import beyond, special
 
 
@@ -24,6 +24,12 @@ def random_pose(rng):
 def random_links(rng, count):
     """Random transforms, stacked."""
     return (np.array([random_pose(rng) for _ in range(count)]),)
+
+
+def links_nearly_along_the_axes(rng):
+    """Transforms that turn by less than a thousandth, or by a quarter turn more: small entries count."""
+    turns = exp_so3(rng.uniform(1e-4, 3e-4, (3, 3))) @ exp_so3(np.pi / 2 * np.eye(3)[rng.integers(3)])
+    return (frames.pose(turns, rng.uniform(-300, 300, (3, 3))),)
 
 
 def loop_product(rng, between_deg):
@@ -487,9 +493,16 @@ CHAPTER = Chapter(
             draw=tuple(functools.partial(random_links, count=n) for n in (3, 2, 9, 4, 6)),
             metric=metrics.Poses(1e-6, 1e-6),
             noisy=(
-                functools.partial(random_links, count=1),
-                metrics.Poses(1e-6, 1e-6),
-                "right, but not for a single link:",
+                (
+                    functools.partial(random_links, count=1),
+                    metrics.Poses(1e-6, 1e-6),
+                    "right, but not for a single link:",
+                ),
+                (
+                    links_nearly_along_the_axes,
+                    metrics.Poses(1e-6, 1e-6),
+                    "right, but not where the links lie nearly along the axes of one another, but for less than a thousandth:",
+                ),
             ),
             properties=(right_where(chain, metrics.Poses(1e-6, 1e-6), *special.CHAINS),),
             hints=(

@@ -410,6 +410,11 @@ def trolley(rng):
     return tuple(pose(exp_so3(rng.normal(size=3)), rng.uniform(-600, 600, 3)) for _ in range(4))
 
 
+def trolley_hardly_turned(rng):
+    """The same where all frames lie along one another, but for some ten-thousandths."""
+    return tuple(pose(exp_so3(rng.uniform(1e-4, 3e-4, 3)), rng.uniform(-600, 600, 3)) for _ in range(4))
+
+
 def trolley_at_rest(rng):
     """The same where the trolley has not moved."""
     T_BW, T_WE, _, T_BP = trolley(rng)
@@ -921,6 +926,11 @@ CELL = [
         draw=trolley,
         metric=metrics.Poses(1e-6, 1e-6),
         noisy=(
+            (
+                trolley_hardly_turned,
+                metrics.Poses(1e-6, 1e-6),
+                "right, but not where all frames lie nearly along one another, but for ten-thousandths:",
+            ),
             (trolley_at_rest, metrics.Poses(1e-6, 1e-6), "right, but not where the trolley has not moved:"),
             (trolley_turned, metrics.Poses(1e-6, 1e-6), "right, but not where the tracker turns on the spot:"),
             (trolley_far_off, metrics.Poses(1e-6, 1e-4), "right, but not tens of meters off:"),

@@ -148,6 +148,19 @@ def joint_angles(rng):
     return dh, rng.uniform(TX40.q_min, TX40.q_max)
 
 
+def hardly_turned_link(rng):
+    """Parameters of a link whose angles are less than a thousandth."""
+    return (*(rng.uniform((2e-4, 50, 50, 2e-4), (9e-4, 300, 300, 9e-4)) * rng.choice([-1, 1], 4)),)
+
+
+def joints_nearly_straight(rng):
+    """A robot that stands so that each of its frames lies along the one before, but for some ten-thousandths."""
+    dh, q = joint_angles(rng)
+    dh[:, [0, 3]] = rng.uniform(5e-5, 1.5e-4, (6, 2))
+    dh[:, 0] -= q
+    return dh, q
+
+
 def joints_at_rest(rng):
     """The same with half of the joints at 0."""
     dh, q = joint_angles(rng)
@@ -240,6 +253,11 @@ def stacked(rng, sign, first=None, trace=None):
 def blocks(rng, n, **noise):
     """The Kronecker matrix of so many motions with little noise, or other."""
     return (ax_xb.kronecker_matrix(*motions(rng, n, **noise)),)
+
+
+def blocks_of_frames_alike(rng):
+    """The same without noise, of frames that lie along one another, but for some ten-thousandths."""
+    return blocks(rng, 12, std_deg=0.0, std_mm=0.0, R=exp_so3(rng.uniform(2e-4, 6e-4, 3)))
 
 
 def _has_signs(R, first, trace):
@@ -862,6 +880,11 @@ CHAPTER = Chapter(
                     )
                     for k, name in enumerate(("theta", "d", "a", "alpha"))
                 ),
+                (
+                    hardly_turned_link,
+                    metrics.Poses(1e-6, 1e-6),
+                    "right, but not for angles below a thousandth, which count as well:",
+                ),
                 (square_link, metrics.Poses(1e-6, 1e-6), "right, but not where alpha is 90 deg or -90 deg:"),
                 (
                     long_link_turned_far,
@@ -941,6 +964,11 @@ CHAPTER = Chapter(
             fixed={"dh": "six joints, four parameters each", "q": "six joints"},
             metric=metrics.Poses(1e-6, 1e-6),
             noisy=(
+                (
+                    joints_nearly_straight,
+                    metrics.Poses(1e-6, 1e-6),
+                    "right, but not where each frame lies nearly along the one before, but for ten-thousandths:",
+                ),
                 (joints_at_rest, metrics.Poses(1e-6, 1e-6), "right, but not where joints stand at 0:"),
                 (
                     joints_of_the_tx40,
@@ -1134,6 +1162,11 @@ CHAPTER = Chapter(
                     functools.partial(blocks, n=2, std_deg=0.0, std_mm=0.0),
                     metrics.Rotations(1e-5),
                     "right, but not for two motions alone, without noise:",
+                ),
+                (
+                    blocks_of_frames_alike,
+                    metrics.Rotations(1e-5),
+                    "right, but not where the frames lie nearly along one another, but for ten-thousandths:",
                 ),
                 (functools.partial(blocks, n=20), metrics.Rotations(1e-5), "right, but not for twenty motions:"),
             ),

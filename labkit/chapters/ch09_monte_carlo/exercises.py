@@ -2837,6 +2837,14 @@ CHAPTER = Chapter(
                 *(
                     Mistake(
                         functools.partial(_ray_in_steps, cells=cells),
+                        "Your steps are longer than half a cell: the wall is seen up to a whole step late. Take half a cell or less.",
+                        id=f"cast-ray-steps-{cells:g}",
+                    )
+                    for cells in (0.75, 0.8, 0.9, 1.0)
+                ),
+                *(
+                    Mistake(
+                        functools.partial(_ray_in_steps, cells=cells),
                         "Your steps are longer than a cell is wide: they pass over corners and thin walls. Take half a cell or less.",
                         id=f"cast_ray-606eb4{which}",
                     )
