@@ -494,7 +494,8 @@ def ratio_words(answer, expected):
     an array, the one fraction that all its numbers are.
     """
     if np.ndim(expected):
-        fraction = _fraction(_common_ratio(np.asarray(answer, dtype=float), np.asarray(expected, dtype=float)))
+        ratio = _common_ratio(np.asarray(answer, dtype=float), np.asarray(expected, dtype=float))
+        fraction = _fraction(ratio) or _power_of_ten(ratio)
         return fraction and f"each of your numbers is {fraction} times the expected one"
     if not (np.isfinite(answer) and expected and answer):
         return None
@@ -524,6 +525,12 @@ def _fraction(ratio):
             if np.gcd(n, m) == 1 and n != m and abs(abs(ratio) ** power * m / n - 1) < EXACT:
                 return ("minus " if ratio < 0 else "") + form.format(f"{n}/{m}" if m > 1 else n)
     return None
+
+
+def _power_of_ten(ratio):
+    """A power of ten that a ratio is, or is but for its sign; None where it is none."""
+    power = 10.0 ** np.round(np.log10(abs(ratio))) if np.isfinite(ratio) and ratio else 1.0
+    return f"{np.copysign(power, ratio):g}" if power != 1.0 and abs(abs(ratio) / power - 1) < EXACT else None
 
 
 def _common_ratio(answer, expected):
