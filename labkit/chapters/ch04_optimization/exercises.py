@@ -1524,7 +1524,7 @@ CHAPTER = Chapter(
             mistakes=[
                 Mistake(
                     beyond.chords(lambda t, v, c: (v - c[::-1]).max()),
-                    "Your chord has its ends exchanged: at the fraction t the place is (1 − t) x + t y, and its height (1 − t) f(x) + t f(y).",
+                    "Your chord has at one end the height of the other: are its ends exchanged, or does np.interp get numbers that fall? At the fraction t the place is (1 − t) x + t y, and its height (1 − t) f(x) + t f(y).",
                     id="chord-ends",
                 ),
                 Mistake(
