@@ -59,7 +59,7 @@ np.set_printoptions(precision=4, suppress=True)
 @ex.decode_packet
 def decode_packet(data):
     """Return time (s), position (mm), shape (3,), and quaternion x, y, z, w, shape
-    (4,), of a packet of 184 bytes."""
+    (4,), of a good packet of 184 bytes, from no more than 10 m away."""
     ### BEGIN SOLUTION
     values = np.frombuffer(data, "<f8")
     return values[1], 1000 * values[2:5], values[11:15]

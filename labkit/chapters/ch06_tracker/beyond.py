@@ -255,6 +255,14 @@ def rays(rng, most):
     return origins, directions * rng.uniform(0.3, 4, (n, 1))
 
 
+def rays_from_behind(rng):
+    """The same where the point lies behind the origins of some or all of them: what counts are the lines."""
+    origins, directions = rays(rng, 6)
+    signs = np.where(rng.random(len(origins)) < 0.3, 1.0, -1.0)
+    signs[rng.integers(len(origins))] = -1.0
+    return origins, directions * signs[:, None]
+
+
 def rays_nearly_parallel(rng):
     """Four rays within a few degrees of one another, as from a station far away, that pass a point."""
     place, far = rng.uniform(-500, 500, 3), unit_vector(rng.normal(size=3))
@@ -672,6 +680,11 @@ STATIONS = [
         draw=tuple(functools.partial(rays, most=most) for most in (6, 2, 3)),
         metric=metrics.Numbers(1e-6, "mm"),
         noisy=(
+            (
+                rays_from_behind,
+                metrics.Numbers(1e-6, "mm"),
+                "right, but not where the point lies behind the origin of a ray: the line counts, which goes both ways:",
+            ),
             (
                 rays_nearly_parallel,
                 metrics.Numbers(1e-6, "mm"),
