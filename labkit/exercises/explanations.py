@@ -346,8 +346,6 @@ class Explanations(Named):
         )
         named = None if special or near else self._named_elsewhere()
         asked = f". Where it is wrong: {named}" if named else asked
-        if isinstance(metric, metrics.Exactly) and len(pairs) > 2 and are_one([result for result, _ in pairs]):
-            told = f"it is {shown_whole(pairs[0][0])} on every draw. {told[0].upper()}{told[1:]}"
         right = special or f"It was right on {len(pairs) - len(missed)} of {len(pairs)} draws{asked}"
         return f"{told} {right}{example}"
 
@@ -377,14 +375,10 @@ class Explanations(Named):
 
     def _as_typed(self, args):
         """(result, expected) for the digits of the arguments that a call shows; None where one of both fails there."""
-        args = [
-            np.array(ast.literal_eval(short(arg)), dtype=arg.dtype) if isinstance(arg, np.ndarray) else arg
-            for arg in args
-        ]
-        args = [float(short(arg)) if isinstance(arg, float) else arg for arg in args]
         try:
+            args = [_as_shown(arg) for arg in args]
             expected = self.exercise.reference(*copy.deepcopy(args))
-        except Exception:  # of digits that are left, no matrix need be a rotation
+        except Exception:  # infinity is no digits, and of digits that are left no matrix need be a rotation
             return None
         admitted = functools.partial(admitted_by, self.exercise.metric, expected)
         run = guard.run(self.function, args, admitted, self.exercise.limit)
@@ -480,3 +474,10 @@ def unread_arguments(function):
     loads = [i for i in dis.get_instructions(code) if i.opname.startswith("LOAD") and i.opname != "LOAD_CONST"]
     read = {name for i in loads for name in (i.argval if isinstance(i.argval, tuple) else (i.argval,))}
     return set(names) - read - set(code.co_cellvars)
+
+
+def _as_shown(value):
+    """A number or an array of the digits in which it is shown; anything else as it is."""
+    if isinstance(value, np.ndarray):
+        return np.array(ast.literal_eval(short(value)), dtype=value.dtype)
+    return float(short(value)) if isinstance(value, float) else value

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..geometry import frames
 from .metrics import Angles, Exactly, Numbers, Poses, Rotations, Several, Through, is_single
+from .wording import joined
 
 CLOSE = 1e4  # tolerances: an answer nearer than this is nearly right, but not accurate enough ...
 FAR = 1e-2  # ... unless it is off by more than this: a coarse tolerance leaves no room for less accurate answers
@@ -171,10 +172,6 @@ def _rotation_kind(matrices, what):
     return None
 
 
-def _listed(names):
-    return " and ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
-
-
 def _on_some(true):
     return "" if all(true) else " on some draws"
 
@@ -184,7 +181,7 @@ def _sheared_words(off):
     lengths = [name for name, amount in zip("xyz", np.diag(off)) if amount > SHEARED]
     askew = [f"{'xyz'[i]} and {'xyz'[j]}" for i, j in ((0, 1), (0, 2), (1, 2)) if off[i, j] > SHEARED]
     if not askew:
-        return f"the length of its column{'s' * (len(lengths) > 1)} {_listed(lengths)} is not 1"
+        return f"the length of its column{'s' * (len(lengths) > 1)} {joined(lengths)} is not 1"
     if not lengths and len(askew) < 3:
         return f"its columns {', and '.join(askew)} are not perpendicular"
     return f"RᵀR differs from I by {off.max():.2g}"
@@ -215,7 +212,7 @@ def turned_axes(metric, pairs):
     for signs in itertools.product((1, -1), repeat=3):
         if all(metric.equal(_with_axes(metric, result, signs), expected) for result, expected in pairs):
             names = [axis for axis, sign in zip("xyz", signs) if sign < 0]
-            return f"your {_listed(names)} {'point' if names[1:] else 'points'} the other way"
+            return f"your {joined(names)} {'point' if names[1:] else 'points'} the other way"
     return None
 
 

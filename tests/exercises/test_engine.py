@@ -1,6 +1,7 @@
 # ruff: noqa: NPY002, SIM105, SIM223 (hostile student code, on purpose)
 """The engine survives any student code and says what is wrong with it."""
 
+import ast
 import copy
 import itertools
 import json
@@ -538,6 +539,25 @@ def test_wrong_on_some_draws_only_says_so():
     text = exercise.judge(lambda v: v, rng=np.random.default_rng(0)).text
     assert "draws it was wrong exactly where `v` is negative" in text
     assert "Not right when called as size(v=-" in text
+
+
+def test_a_call_that_is_shown_gives_what_is_shown_and_infinity_may_stand_in_it():
+    def judged(draw, reference, answer):
+        item = Exercise("f", reference=reference, draw=draw, metric=metrics.Numbers(), hints=("a", "b", "c"))
+        return item.judge(answer, rng=np.random.default_rng(0)).text
+
+    def bent(v):
+        return v * np.sign(v[0]) / np.linalg.norm(v) + 0.01 * np.sin(1000 * v)
+
+    text = judged(lambda rng: (rng.uniform(-1e-2, 1e-2, 3),), lambda v: v / np.linalg.norm(v), bent)
+    given, gives = re.search(r"f\(v=(\[.*?\])\): it gives (\[.*?\])", text).groups()
+    assert np.allclose(bent(np.array(ast.literal_eval(given))), ast.literal_eval(gives), atol=6e-4)
+    infinite = judged(
+        lambda rng: (np.append(rng.normal(size=3), -np.inf),),
+        lambda v: float(np.exp(v).sum()),
+        lambda v: float(1.7 * (np.exp(v) ** 2).sum() + v[0]),
+    )
+    assert "-inf" in infinite and "it gives" in infinite
 
 
 @pytest.mark.parametrize("right_below", [0.0, 3.0])

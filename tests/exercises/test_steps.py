@@ -1131,7 +1131,7 @@ def several(rng):
         (
             _clipped,
             "return np.where(a < 0, 0.0, np.where(a > 2, 2.0, a))",
-            "belongs there in all cases.",
+            "`np.where(a > 2, 2.0, a)`: `a` belongs there in all cases.",
         ),
         (
             _clipped,

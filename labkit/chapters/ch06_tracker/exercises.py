@@ -257,7 +257,7 @@ def blocks(rng, n, **noise):
 
 def blocks_of_frames_alike(rng):
     """The same without noise, of frames that lie along one another, but for some ten-thousandths."""
-    return blocks(rng, 12, std_deg=0.0, std_mm=0.0, R=exp_so3(rng.uniform(2e-4, 6e-4, 3)))
+    return blocks(rng, 20, std_deg=0.0, std_mm=0.0, R=exp_so3(rng.uniform(2e-4, 6e-4, 3)))
 
 
 def _has_signs(R, first, trace):
