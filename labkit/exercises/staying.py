@@ -129,17 +129,17 @@ class Staying(Evidence):
             if not kind.left() or k >= min(len(args), len(other)) or type(args[k]) is not type(other[k]):
                 continue
             parts = turn - TURNS + len(PARTS)
-            before = other[k] if parts < 0 else partly_alike(args[k], other[k], parts)
+            first = other[k] if parts < 0 else partly_alike(args[k], other[k], parts)
             expected = exercise.reference(*copy.deepcopy(args))
             admitted = functools.partial(admitted_by, exercise.metric, expected)
-            before = guard.run(self.function, (*args[:k], before, *args[k + 1 :]), admitted, exercise.limit)
+            before = guard.run(self.function, (*args[:k], first, *args[k + 1 :]), admitted, exercise.limit)
             run = guard.run(self.function, args, admitted, exercise.limit)
             if before.error is not None or run.error is not None or exercise.metric.equal(run.result, expected):
                 continue
             as_then = same_numbers(numbers_of(run.result), numbers_of(before.result))
             if as_then or self._is_right_on(self.defaults.fresh, args, exercise.metric, expected):
                 told = "returns what it returned then" if as_then else "is no longer right"
-                another = f"another `{name}`" + (f" {PARTS[parts]}" if parts >= 0 else "")
+                another = f"another `{name}`" + (f" {PARTS[parts]}" if first is not other[k] else "")
                 rest = " and all else as before" if len(args) > 1 else ""
                 return (
                     f"right at first, but called again with {another}{rest}, your function "

@@ -1434,3 +1434,15 @@ def test_a_mistake_is_named_if_it_shows_on_draws_that_this_check_had_not():
         "You added the first three."
     }
     assert not any("first three" in exercise.judge(by_threes, rng).text for rng in checks)
+
+
+@pytest.mark.parametrize("kind, nearly", [(float, True), (str, False)])
+def test_an_argument_is_called_nearly_the_same_where_it_is(kind, nearly):
+    def remembers(v, known={}):  # noqa: B006, what it keeps is the slip
+        return known.setdefault(round(float(v), 3) if nearly else len(v), 2 * float(v))
+
+    exercise = replace(
+        DOUBLE, reference=lambda v: 2 * float(v), draw=lambda rng: (kind(round(rng.normal(), 9)),), mistakes=[]
+    )
+    text = exercise.judge(remembers, rng=np.random.default_rng(0)).text
+    assert text and ("nearly the same" in text) == nearly
